@@ -1,0 +1,1 @@
+//! Ray acceleration: BVH build and traversal. The only place that names obvhs.

@@ -1,0 +1,1 @@
+//! Rasters to and from EXR, PNG, JPEG and HDR, with bounded memory.

@@ -1,0 +1,1 @@
+//! Sweep manifests: parsed with positions, expanded into jobs, checked against a scene.

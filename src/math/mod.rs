@@ -1,0 +1,14 @@
+//! Numbers: the float abstraction, vectors and frames, hashing, low-discrepancy points, warps and statistics.
+//!
+//! Everything random or transcendental comes from here, so that the same input gives the same bits on every machine.
+
+pub mod frame;
+pub mod hash;
+mod real;
+pub mod sobol;
+mod vec3;
+pub mod warp;
+
+pub use frame::Frame;
+pub use real::Real;
+pub use vec3::V3;

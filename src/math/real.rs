@@ -1,0 +1,176 @@
+//! The float type that shading code is generic over.
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+/// A float: `f32` in renders, `f64` as the twin that tests measure `f32` against.
+///
+/// Square roots are the hardware's (IEEE 754 rounds them correctly everywhere); other functions are `libm`'s, whose bits do
+/// not depend on the C library or the processor.
+pub trait Real:
+    Copy
+    + Debug
+    + Default
+    + PartialEq
+    + PartialOrd
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+    + DivAssign
+{
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+    /// π.
+    const PI: Self;
+    /// 1/π.
+    const FRAC_1_PI: Self;
+    /// The distance from 1 to the next larger number.
+    const EPSILON: Self;
+
+    /// The nearest number of this type.
+    fn of(value: f64) -> Self;
+    /// The value as `f64`, exact.
+    fn to_f64(self) -> f64;
+    /// √self, correctly rounded.
+    fn sqrt(self) -> Self;
+    /// |self|.
+    fn abs(self) -> Self;
+    /// The larger of two; the other one where one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// The smaller of two; the other one where one is NaN.
+    fn min(self, other: Self) -> Self;
+    /// Neither infinite nor NaN.
+    fn is_finite(self) -> bool;
+    /// The sine of an angle in radians.
+    fn sin(self) -> Self;
+    /// The cosine of an angle in radians.
+    fn cos(self) -> Self;
+    /// The natural logarithm.
+    fn ln(self) -> Self;
+    /// e^self.
+    fn exp(self) -> Self;
+    /// self^exponent.
+    fn powf(self, exponent: Self) -> Self;
+    /// The angle of the vector (x, self), in (-π, π].
+    fn atan2(self, x: Self) -> Self;
+    /// The angle in [0, π] whose cosine is self.
+    fn acos(self) -> Self;
+    /// self with the sign of `sign`.
+    fn copysign(self, sign: Self) -> Self;
+
+    /// The value as `f32`, rounded to nearest.
+    fn to_f32(self) -> f32 {
+        self.to_f64() as f32
+    }
+    /// self².
+    #[inline]
+    fn sqr(self) -> Self {
+        self * self
+    }
+    /// self⁵.
+    #[inline]
+    fn pow5(self) -> Self {
+        self.sqr().sqr() * self
+    }
+    /// self limited to [low, high].
+    #[inline]
+    fn clamp(self, low: Self, high: Self) -> Self {
+        self.max(low).min(high)
+    }
+    /// √max(self, 0): for differences that are non-negative in exact arithmetic.
+    #[inline]
+    fn safe_sqrt(self) -> Self {
+        self.max(Self::ZERO).sqrt()
+    }
+    /// self·(1 - t) + other·t.
+    #[inline]
+    fn lerp(self, other: Self, t: Self) -> Self {
+        self * (Self::ONE - t) + other * t
+    }
+}
+
+macro_rules! real {
+    ($float:ident, $sin:path, $cos:path, $ln:path, $exp:path, $pow:path, $atan2:path, $acos:path) => {
+        impl Real for $float {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const PI: Self = std::$float::consts::PI;
+            const FRAC_1_PI: Self = std::$float::consts::FRAC_1_PI;
+            const EPSILON: Self = $float::EPSILON;
+
+            #[inline]
+            fn of(value: f64) -> Self {
+                value as $float
+            }
+            #[inline]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline]
+            fn sqrt(self) -> Self {
+                $float::sqrt(self)
+            }
+            #[inline]
+            fn abs(self) -> Self {
+                $float::abs(self)
+            }
+            #[inline]
+            fn max(self, other: Self) -> Self {
+                $float::max(self, other)
+            }
+            #[inline]
+            fn min(self, other: Self) -> Self {
+                $float::min(self, other)
+            }
+            #[inline]
+            fn is_finite(self) -> bool {
+                $float::is_finite(self)
+            }
+            #[inline]
+            fn sin(self) -> Self {
+                $sin(self)
+            }
+            #[inline]
+            fn cos(self) -> Self {
+                $cos(self)
+            }
+            #[inline]
+            fn ln(self) -> Self {
+                $ln(self)
+            }
+            #[inline]
+            fn exp(self) -> Self {
+                $exp(self)
+            }
+            #[inline]
+            fn powf(self, exponent: Self) -> Self {
+                $pow(self, exponent)
+            }
+            #[inline]
+            fn atan2(self, x: Self) -> Self {
+                $atan2(self, x)
+            }
+            #[inline]
+            fn acos(self) -> Self {
+                $acos(self)
+            }
+            #[inline]
+            fn copysign(self, sign: Self) -> Self {
+                $float::copysign(self, sign)
+            }
+        }
+    };
+}
+
+real!(f32, libm::sinf, libm::cosf, libm::logf, libm::expf, libm::powf, libm::atan2f, libm::acosf);
+real!(f64, libm::sin, libm::cos, libm::log, libm::exp, libm::pow, libm::atan2, libm::acos);

@@ -1,0 +1,1 @@
+//! Owen-scrambled Sobol' points, four dimensions at a time.

@@ -1,0 +1,1 @@
+//! What a render leaves behind: names, provenance, layers of a result, tone curves.

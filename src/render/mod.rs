@@ -1,0 +1,1 @@
+//! Rendering: preparing a scene, tracing paths, collecting film.

@@ -1,0 +1,206 @@
+//! Disney materials: each parameter a constant or a texture.
+
+use glam::{Affine2, Vec2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::TextureId;
+use crate::color::Rgb;
+use crate::disney::{DiffuseModel, Masking, Model, Parameter};
+
+/// What a surface is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// The kind of BSDF.
+    pub model: Model,
+    /// Linear reflectance.
+    pub base_color: Param<Rgb>,
+    /// The ten scalars of Burley 2012, in the order of [`Parameter::ALL`].
+    pub scalars: [Param<f32>; 10],
+    /// The roughness of the specular lobe's masking term.
+    pub masking: Masking,
+    /// The diffuse term.
+    pub diffuse: DiffuseModel,
+    /// The refractive index inside over outside, for [`Model::Dielectric`].
+    pub ior: f32,
+    /// Light that the surface sends out by itself.
+    pub emission: Emission,
+    /// How much of the surface is there.
+    pub opacity: Opacity,
+    /// Perturbs the shading normal.
+    pub normal_map: Option<NormalMap>,
+    /// Where the tangent comes from.
+    pub frame: ShadingFrame,
+    /// Turns the tangent about the normal, counter-clockwise, in radians.
+    pub rotation: f32,
+    /// The sides that scatter light; the other side blocks.
+    pub sides: Sides,
+    /// Whether the mesh's vertex colours multiply `base_color` and the opacity.
+    pub vertex_color: bool,
+}
+
+impl Default for Material {
+    /// The defaults of the model, on both sides, opaque, dark.
+    fn default() -> Self {
+        Self {
+            model: Model::Disney,
+            base_color: Param::Constant(Rgb::grey(0.8)),
+            scalars: Parameter::ALL.map(|p| Param::Constant(p.default())),
+            masking: Masking::default(),
+            diffuse: DiffuseModel::default(),
+            ior: 1.5,
+            emission: Emission::default(),
+            opacity: Opacity::default(),
+            normal_map: None,
+            frame: ShadingFrame::default(),
+            rotation: 0.0,
+            sides: Sides::Both,
+            vertex_color: false,
+        }
+    }
+}
+
+impl Material {
+    /// The scalar of that name.
+    pub fn scalar(&self, parameter: Parameter) -> &Param<f32> {
+        &self.scalars[parameter as usize]
+    }
+
+    /// A mutable reference to the scalar of that name.
+    pub fn scalar_mut(&mut self, parameter: Parameter) -> &mut Param<f32> {
+        &mut self.scalars[parameter as usize]
+    }
+
+    /// Whether any light leaves the surface by itself.
+    pub fn emits(&self) -> bool {
+        let factor = match self.emission.color {
+            Param::Constant(c) => c,
+            Param::Texture { factor, .. } => factor,
+        };
+        self.emission.strength > 0.0 && !factor.is_black()
+    }
+}
+
+/// A value that is the same everywhere, or varies over the surface.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Param<T> {
+    /// The same everywhere.
+    Constant(T),
+    /// `factor` times the filtered texture.
+    Texture {
+        /// Which texture and how it lies on the surface.
+        map: TextureMap,
+        /// Multiplies the texture's value.
+        factor: T,
+    },
+}
+
+impl<T: Copy> Param<T> {
+    /// The value, if it is the same everywhere.
+    pub fn constant(&self) -> Option<T> {
+        match *self {
+            Self::Constant(value) => Some(value),
+            Self::Texture { .. } => None,
+        }
+    }
+}
+
+/// A texture as one parameter uses it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureMap {
+    /// The texture.
+    pub texture: TextureId,
+    /// What a scalar parameter reads of it; colours read R, G and B.
+    pub channel: TextureChannel,
+    /// The mesh's set of texture coordinates.
+    pub uv_set: u32,
+    /// Texture coordinates from the mesh's.
+    pub texture_from_uv: Affine2,
+}
+
+impl TextureMap {
+    /// `channel` of `texture` by the first set of coordinates as they are.
+    pub fn new(texture: TextureId, channel: TextureChannel) -> Self {
+        Self { texture, channel, uv_set: 0, texture_from_uv: Affine2::IDENTITY }
+    }
+
+    /// Texture coordinates at the mesh's coordinates `uv`.
+    pub fn coordinates(&self, uv: Vec2) -> Vec2 {
+        self.texture_from_uv.transform_point2(uv)
+    }
+}
+
+/// What a scalar reads of a texture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TextureChannel {
+    /// Red.
+    #[default]
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+    /// Alpha: 1 where the image has none.
+    A,
+}
+
+/// Light that a surface sends out by itself: radiance = strength·color, the same in all directions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emission {
+    /// Its colour.
+    pub color: Param<Rgb>,
+    /// Multiplies the colour.
+    pub strength: f32,
+    /// The sides it leaves.
+    pub sides: Sides,
+}
+
+impl Default for Emission {
+    fn default() -> Self {
+        Self { color: Param::Constant(Rgb::BLACK), strength: 1.0, sides: Sides::Front }
+    }
+}
+
+/// How much of a surface is there: 0 lets everything pass, 1 nothing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Opacity {
+    /// The alpha.
+    pub alpha: Param<f32>,
+    /// Alpha at or above this is 1 and below it is 0.
+    pub cutoff: Option<f32>,
+}
+
+impl Default for Opacity {
+    fn default() -> Self {
+        Self { alpha: Param::Constant(1.0), cutoff: None }
+    }
+}
+
+/// A tangent-space normal map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalMap {
+    /// Red and green hold x and y, [0, 1] for [-1, 1]; blue holds z.
+    pub map: TextureMap,
+    /// Multiplies x and y before normalising.
+    pub scale: f32,
+}
+
+/// Where the shading frame's tangent comes from. It matters to anisotropic and normal-mapped materials alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ShadingFrame {
+    /// The mesh's tangents, else its texture coordinates, else an arbitrary one.
+    #[default]
+    Surface,
+    /// Nori's coordinate system of the shading normal, as Aris.
+    Nori,
+}
+
+/// Sides of a surface; the front is where its triangles are counter-clockwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// The front alone.
+    Front,
+    /// Front and back.
+    Both,
+}

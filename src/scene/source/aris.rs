@@ -1,0 +1,5 @@
+//! Aris.
+
+/// A material.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ArisMaterial {}

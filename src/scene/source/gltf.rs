@@ -1,0 +1,5 @@
+//! Gltf.
+
+/// A material.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GltfMaterial {}

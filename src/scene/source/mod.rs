@@ -1,0 +1,20 @@
+//! Materials in the terms of the file they come from, as plain data: conversion reads them, importers write them.
+
+mod aris;
+mod gltf;
+mod mtl;
+
+pub use aris::ArisMaterial;
+pub use gltf::GltfMaterial;
+pub use mtl::MtlMaterial;
+
+/// A material as its file describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SourceMaterial {
+    /// glTF 2.0.
+    Gltf(GltfMaterial),
+    /// Wavefront MTL.
+    Mtl(MtlMaterial),
+    /// Aris YAML.
+    Aris(ArisMaterial),
+}

@@ -1,0 +1,5 @@
+//! Mtl.
+
+/// A material.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MtlMaterial {}

@@ -1,0 +1,223 @@
+//! Images and how they are sampled. 8-bit data stays 8 bits wide and is decoded per texel.
+
+use glam::Vec2;
+
+use crate::color::{Rgb, linear_from_srgb};
+
+/// Pixels in memory, row-major from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// For messages: the file, or the name inside it.
+    pub name: String,
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+    /// Interleaved channels a pixel: 1 (grey), 2 (grey, alpha), 3 or 4.
+    pub channels: u8,
+    /// The values, width · height · channels of them.
+    pub pixels: Pixels,
+}
+
+/// The values of an image.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pixels {
+    /// [0, 255] for [0, 1].
+    U8(Vec<u8>),
+    /// [0, 65535] for [0, 1].
+    U16(Vec<u16>),
+    /// Floats, finite.
+    F32(Vec<f32>),
+}
+
+/// An image with its encoding and sampler.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// The image.
+    pub image: super::ImageId,
+    /// What its colour values mean.
+    pub encoding: Encoding,
+    /// Outside [0, 1], horizontally and vertically.
+    pub wrap: [Wrap; 2],
+    /// Between texels.
+    pub filter: TexelFilter,
+}
+
+/// What the stored values of a texture mean; alpha is always linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Encoding {
+    /// As they are.
+    Linear,
+    /// sRGB's curve.
+    Srgb,
+}
+
+/// Texture coordinates outside [0, 1].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Wrap {
+    /// The image repeats.
+    #[default]
+    Repeat,
+    /// The image repeats, every other one mirrored.
+    Mirror,
+    /// The edge's texels go on.
+    Clamp,
+}
+
+/// Between texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum TexelFilter {
+    /// Weighted by distance.
+    #[default]
+    Bilinear,
+    /// The nearest one.
+    Nearest,
+}
+
+/// A decoded texel: linear colour and alpha.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Texel {
+    /// Linear colour.
+    pub color: Rgb,
+    /// Alpha, 1 where the image has none.
+    pub alpha: f32,
+}
+
+impl Image {
+    /// The stored value of channel `c` at pixel `i`, integers scaled to [0, 1].
+    #[inline]
+    fn stored(&self, i: usize, c: usize) -> f32 {
+        let at = i * usize::from(self.channels) + c;
+        match &self.pixels {
+            Pixels::U8(v) => f32::from(v[at]) * (1.0 / 255.0),
+            Pixels::U16(v) => f32::from(v[at]) * (1.0 / 65535.0),
+            Pixels::F32(v) => v[at],
+        }
+    }
+
+    /// The texel at a pixel inside the image.
+    #[inline]
+    pub fn texel(&self, x: u32, y: u32, encoding: Encoding) -> Texel {
+        let i = y as usize * self.width as usize + x as usize;
+        let decode = |c: usize| match encoding {
+            Encoding::Linear => self.stored(i, c),
+            Encoding::Srgb => match &self.pixels {
+                Pixels::U8(v) => srgb_table()[usize::from(v[i * usize::from(self.channels) + c])],
+                Pixels::U16(_) | Pixels::F32(_) => linear_from_srgb(self.stored(i, c)),
+            },
+        };
+        match self.channels {
+            1 | 2 => Texel {
+                color: Rgb::grey(decode(0)),
+                alpha: if self.channels == 2 { self.stored(i, 1) } else { 1.0 },
+            },
+            _ => Texel {
+                color: Rgb::new(decode(0), decode(1), decode(2)),
+                alpha: if self.channels == 4 { self.stored(i, 3) } else { 1.0 },
+            },
+        }
+    }
+}
+
+/// Linear values of all 8-bit sRGB codes.
+fn srgb_table() -> &'static [f32; 256] {
+    static TABLE: std::sync::OnceLock<[f32; 256]> = std::sync::OnceLock::new();
+    TABLE.get_or_init(|| std::array::from_fn(|code| linear_from_srgb(code as f32 / 255.0)))
+}
+
+impl Wrap {
+    /// The pixel in [0, size) that stands for `i`.
+    #[inline]
+    pub fn pixel(self, i: i64, size: u32) -> u32 {
+        let n = i64::from(size);
+        let wrapped = match self {
+            Self::Clamp => i.clamp(0, n - 1),
+            Self::Repeat => i.rem_euclid(n),
+            Self::Mirror => {
+                let j = i.rem_euclid(2 * n);
+                if j < n { j } else { 2 * n - 1 - j }
+            }
+        };
+        wrapped as u32
+    }
+}
+
+impl Texture {
+    /// The filtered value at texture coordinates `uv` ((0, 0) is the top left corner of the image). Coordinates that are not
+    /// finite read the first texel.
+    pub fn sample(&self, image: &Image, uv: Vec2) -> Texel {
+        // Beyond 2^31 the fraction is lost anyway, and `as i64` must not saturate into nonsense.
+        let position = |t: f32, size: u32| {
+            let p = t * size as f32;
+            if p.is_finite() && p.abs() < 2.147e9 { p } else { 0.0 }
+        };
+        let (px, py) = (position(uv.x, image.width), position(uv.y, image.height));
+        let fetch = |x: i64, y: i64| {
+            image.texel(
+                self.wrap[0].pixel(x, image.width),
+                self.wrap[1].pixel(y, image.height),
+                self.encoding,
+            )
+        };
+        match self.filter {
+            TexelFilter::Nearest => fetch(px.floor() as i64, py.floor() as i64),
+            TexelFilter::Bilinear => {
+                let (fx, fy) = (px - 0.5, py - 0.5);
+                let (x, y) = (fx.floor(), fy.floor());
+                let (tx, ty) = (fx - x, fy - y);
+                let (x, y) = (x as i64, y as i64);
+                let mix = |a: Texel, b: Texel, t: f32| Texel {
+                    color: a.color.lerp(b.color, t),
+                    alpha: a.alpha * (1.0 - t) + b.alpha * t,
+                };
+                let top = mix(fetch(x, y), fetch(x + 1, y), tx);
+                let bottom = mix(fetch(x, y + 1), fetch(x + 1, y + 1), tx);
+                mix(top, bottom, ty)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::ImageId;
+
+    fn two_by_one() -> (Image, Texture) {
+        let image =
+            Image { name: "test".into(), width: 2, height: 1, channels: 1, pixels: Pixels::U8(vec![0, 255]) };
+        let texture = Texture {
+            image: ImageId(0),
+            encoding: Encoding::Linear,
+            wrap: [Wrap::Repeat; 2],
+            filter: TexelFilter::Bilinear,
+        };
+        (image, texture)
+    }
+
+    #[test]
+    fn bilinear_meets_texel_centres_and_mixes_between() {
+        let (image, texture) = two_by_one();
+        let at = |u: f32| texture.sample(&image, Vec2::new(u, 0.5)).color.r;
+        assert_eq!(at(0.25), 0.0);
+        assert_eq!(at(0.75), 1.0);
+        assert_eq!(at(0.5), 0.5);
+        assert_eq!(at(0.0), 0.5, "repeats across the edge");
+        assert_eq!(at(-0.75), 0.0);
+    }
+
+    #[test]
+    fn wraps_name_the_right_pixel() {
+        assert_eq!([-1, 0, 2, 3].map(|i| Wrap::Repeat.pixel(i, 3)), [2, 0, 2, 0]);
+        assert_eq!([-1, 0, 2, 3].map(|i| Wrap::Mirror.pixel(i, 3)), [0, 0, 2, 2]);
+        assert_eq!([-1, 0, 2, 3].map(|i| Wrap::Clamp.pixel(i, 3)), [0, 0, 2, 2]);
+    }
+
+    #[test]
+    fn coordinates_that_are_not_finite_do_no_harm() {
+        let (image, texture) = two_by_one();
+        for u in [f32::NAN, f32::INFINITY, 1e30, -1e30] {
+            assert!(texture.sample(&image, Vec2::new(u, u)).color.is_finite());
+        }
+    }
+}
