@@ -9,7 +9,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
 use super::triangle::Triangle;
-use super::{Bvh, MAX_DEPTH, Node};
+use super::{Bvh, Node};
 
 /// Why a tree could not be built.
 #[derive(Debug, thiserror::Error)]
@@ -19,12 +19,6 @@ pub enum BuildError {
     TooManyTriangles {
         /// How many there are.
         count: usize,
-    },
-    /// The tree is deeper than traversal's stack.
-    #[error("the geometry needs a tree {depth} levels deep; at most {MAX_DEPTH} can be traversed")]
-    TooDeep {
-        /// How deep it is.
-        depth: usize,
     },
 }
 
@@ -37,7 +31,7 @@ impl Bvh {
     /// A tree over `triangles`, whose vertices must be finite.
     ///
     /// # Errors
-    /// [`BuildError`] where there are too many triangles or the tree is too deep.
+    /// [`BuildError`] where there are too many triangles.
     pub fn build(triangles: &[[Vec3; 3]]) -> Result<Self, BuildError> {
         if u32::try_from(triangles.len()).is_err() {
             return Err(BuildError::TooManyTriangles { count: triangles.len() });
@@ -48,10 +42,6 @@ impl Bvh {
         let boxes: Vec<Aabb> =
             triangles.iter().map(|t| Aabb::from_points(&t.map(glam::Vec3A::from))).collect();
         let tree = build_bvh2(&boxes, parameters(), &mut Duration::default());
-        let depth = tree.depth(0);
-        if depth > MAX_DEPTH {
-            return Err(BuildError::TooDeep { depth });
-        }
         Ok(Self {
             nodes: layout(&tree),
             triangles: tree.primitive_indices.iter().map(|&i| Triangle::new(triangles[i as usize])).collect(),

@@ -61,8 +61,44 @@ struct Node {
     count: [u32; 2],
 }
 
-/// The deepest tree that traversal has a stack for.
-const MAX_DEPTH: usize = 128;
+/// Pending nodes that traversal keeps without allocating. Only pathological trees, such as thousands of coincident triangles
+/// make, are deeper.
+const STACK: usize = 96;
+
+/// What is left to visit: node or first triangle, triangle count, and where the ray enters.
+struct Pending {
+    top: usize,
+    near: [(u32, u32, f32); STACK],
+    spilled: Vec<(u32, u32, f32)>,
+}
+
+impl Pending {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { top: 0, near: [(0, 0, 0.0); STACK], spilled: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, entry: (u32, u32, f32)) {
+        if self.top < STACK {
+            self.near[self.top] = entry;
+            self.top += 1;
+        } else {
+            self.spilled.push(entry);
+        }
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(u32, u32, f32)> {
+        if self.top == STACK
+            && let Some(entry) = self.spilled.pop()
+        {
+            return Some(entry);
+        }
+        self.top = self.top.checked_sub(1)?;
+        Some(self.near[self.top])
+    }
+}
 
 /// The far plane is moved out by this factor, so that rounding never makes a ray miss a box it grazes (Ize 2013, "Robust BVH
 /// Ray Traversal"): 1 + 2γ(3).
@@ -126,8 +162,7 @@ impl Bvh {
             return false;
         }
         let inverse = ray.direction.recip();
-        let mut stack = [(0u32, 0u32, 0f32); MAX_DEPTH];
-        let mut top = 0;
+        let mut pending = Pending::new();
         let (mut node, mut count) = (0u32, 0u32);
         loop {
             if count > 0 {
@@ -136,10 +171,7 @@ impl Bvh {
                 }
             } else {
                 let n = &self.nodes[node as usize];
-                let near = [
-                    entry(n.min[0], n.max[0], ray, inverse),
-                    entry(n.min[1], n.max[1], ray, inverse),
-                ];
+                let near = [entry(n.min[0], n.max[0], ray, inverse), entry(n.min[1], n.max[1], ray, inverse)];
                 let order = match near {
                     [None, None] => None,
                     [Some(_), None] => Some((0, None)),
@@ -149,20 +181,16 @@ impl Bvh {
                 };
                 if let Some((first, second)) = order {
                     if let Some((far, t)) = second {
-                        stack[top] = (n.child[far], n.count[far], t);
-                        top += 1;
+                        pending.push((n.child[far], n.count[far], t));
                     }
                     (node, count) = (n.child[first], n.count[first]);
                     continue;
                 }
             }
             loop {
-                if top == 0 {
-                    return false;
-                }
-                top -= 1;
-                if stack[top].2 < ray.t_max {
-                    (node, count) = (stack[top].0, stack[top].1);
+                let Some((next, triangles, near)) = pending.pop() else { return false };
+                if near < ray.t_max {
+                    (node, count) = (next, triangles);
                     break;
                 }
             }
@@ -223,7 +251,11 @@ mod tests {
             } else if ring == rings {
                 -Vec3::Y
             } else {
-                Vec3::new(Real::sin(theta) * Real::cos(phi), Real::cos(theta), Real::sin(theta) * Real::sin(phi))
+                Vec3::new(
+                    Real::sin(theta) * Real::cos(phi),
+                    Real::cos(theta),
+                    Real::sin(theta) * Real::sin(phi),
+                )
             }
         };
         let mut triangles = Vec::new();
@@ -249,7 +281,8 @@ mod tests {
         let mut hits = 0;
         for i in 0..4000 {
             let origin = Vec3::new(random(i, 1), random(i, 2), random(i, 3)) * 4.0 - 2.0;
-            let ray = Ray::new(origin, direction(i));
+            let target = triangles[i as usize % 800][0] + direction(i) * 0.1;
+            let ray = Ray::new(origin, target - origin);
             let sheared = ShearedRay::new(&ray);
             let brute = triangles
                 .iter()
@@ -279,8 +312,11 @@ mod tests {
             let i = i as u64;
             for k in 0..12 {
                 let along = random(i, 100 + k);
-                let target =
-                    if k < 3 { t[k as usize] } else { t[(k % 3) as usize].lerp(t[((k + 1) % 3) as usize], along) };
+                let target = if k < 3 {
+                    t[k as usize]
+                } else {
+                    t[(k % 3) as usize].lerp(t[((k + 1) % 3) as usize], along)
+                };
                 let origin = Vec3::new(random(i, k), random(i, k + 30), random(i, k + 60)) * 0.8 - 0.4;
                 let ray = Ray::new(origin, target - origin);
                 assert!(bvh.closest(&ray).is_some(), "triangle {i}, ray {k}");
@@ -313,7 +349,8 @@ mod tests {
 
     #[test]
     fn thousands_of_coincident_triangles_build_and_are_all_visited() {
-        let triangles = vec![[Vec3::new(-1.0, -1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.0, 1.0, 1.0)]; 5000];
+        let triangles =
+            vec![[Vec3::new(-1.0, -1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.0, 1.0, 1.0)]; 5000];
         let bvh = Bvh::build(&triangles).unwrap();
         let mut seen = 0;
         bvh.visit(&Ray::new(Vec3::ZERO, Vec3::Z), |_| {

@@ -197,9 +197,8 @@ mod tests {
             (0..n).map(|i| product(Sampler::new(u64::from(t), 0, 0, i, 1).set(0, Purpose::Bsdf))).sum::<f64>()
                 / f64::from(n)
         });
-        let theirs = rms(&|t| {
-            (0..n).map(|i| product(sobol_burley::sample_4d(i, 0, t))).sum::<f64>() / f64::from(n)
-        });
+        let theirs =
+            rms(&|t| (0..n).map(|i| product(sobol_burley::sample_4d(i, 0, t))).sum::<f64>() / f64::from(n));
         let random = (1.0f64 / 81.0 - 1.0 / 256.0).sqrt() / f64::from(n).sqrt();
         assert!(ours < 1.25 * theirs, "ours {ours:e}, theirs {theirs:e}");
         assert!(ours < 0.2 * random, "ours {ours:e}, random {random:e}");
@@ -216,10 +215,8 @@ mod tests {
         ];
         for (a, f) in streams.iter().enumerate() {
             for g in &streams[a + 1..] {
-                let covariance: f64 = (0..n)
-                    .map(|i| f64::from(f(i) - 0.5) * f64::from(g(i) - 0.5))
-                    .sum::<f64>()
-                    / f64::from(n);
+                let covariance: f64 =
+                    (0..n).map(|i| f64::from(f(i) - 0.5) * f64::from(g(i) - 0.5)).sum::<f64>() / f64::from(n);
                 assert!((covariance * 12.0).abs() < 0.06, "correlation {}", covariance * 12.0);
             }
         }

@@ -1,0 +1,321 @@
+//! The environment as a light: radiance by direction, sampled in proportion to it.
+
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+
+use super::Distribution;
+use crate::color::Rgb;
+use crate::math::{Real, warp};
+use crate::scene::Image;
+use crate::scene::environment::{Environment, EnvironmentMap, Equirectangular};
+use crate::scene::texture::{Encoding, Wrap};
+
+/// The environment, ready to be looked up and sampled.
+#[derive(Debug)]
+pub struct EnvironmentLight {
+    scale: Rgb,
+    map: Map,
+    /// ∫ luminance dω, to the accuracy of one row's height.
+    total_luminance: f64,
+}
+
+#[derive(Debug)]
+enum Map {
+    Constant,
+    Image(ImageMap),
+}
+
+/// Cells of equal azimuth and rows of polar angle, between whose corners the interpolated image is simple enough to be
+/// integrated exactly.
+#[derive(Debug)]
+struct ImageMap {
+    image: Arc<Image>,
+    mapping: Equirectangular,
+    /// Sine and cosine of the rotation about the up axis.
+    rotation: [f32; 2],
+    columns: usize,
+    /// Cosines of the polar angle between rows, from 1 down to -1.
+    row_cosines: Vec<f32>,
+    rows: Distribution,
+    in_row: Vec<Distribution>,
+}
+
+impl EnvironmentLight {
+    /// Prepares an environment; `image` is the one its map names.
+    pub fn new(environment: &Environment, image: Option<&Arc<Image>>) -> Self {
+        let scale = environment.color * environment.intensity;
+        match (environment.map.clone(), image) {
+            (EnvironmentMap::Image { mapping, .. }, Some(image)) => {
+                let (map, mean) = ImageMap::new(Arc::clone(image), mapping, environment.rotation, scale);
+                Self { scale, map: Map::Image(map), total_luminance: mean }
+            }
+            _ => {
+                let total_luminance = f64::from(scale.luminance()) * 4.0 * std::f64::consts::PI;
+                Self { scale, map: Map::Constant, total_luminance }
+            }
+        }
+    }
+
+    /// ∫ luminance dω over the sphere, to the accuracy of one row's height: it decides how often the environment is chosen.
+    pub fn total_luminance(&self) -> f64 {
+        self.total_luminance
+    }
+
+    /// The radiance that arrives from the unit direction `wi`.
+    pub fn radiance(&self, wi: Vec3) -> Rgb {
+        match &self.map {
+            Map::Constant => self.scale,
+            Map::Image(map) => map.look_up(wi) * self.scale,
+        }
+    }
+
+    /// A direction with its radiance and its density per unit solid angle.
+    pub fn sample(&self, u: [f32; 2]) -> Option<(Vec3, Rgb, f32)> {
+        match &self.map {
+            Map::Constant => {
+                let wi: Vec3 = warp::uniform_sphere(u).into();
+                Some((wi, self.scale, 1.0 / (4.0 * PI)))
+            }
+            Map::Image(map) => {
+                let (wi, pdf) = map.sample(u)?;
+                Some((wi, map.look_up(wi) * self.scale, pdf))
+            }
+        }
+    }
+
+    /// The density of [`Self::sample`] per unit solid angle.
+    pub fn pdf(&self, wi: Vec3) -> f32 {
+        match &self.map {
+            Map::Constant => 1.0 / (4.0 * PI),
+            Map::Image(map) => map.pdf(wi),
+        }
+    }
+}
+
+impl ImageMap {
+    /// The map, and its ∫ luminance dω.
+    fn new(image: Arc<Image>, mapping: Equirectangular, rotation: f32, scale: Rgb) -> (Self, f64) {
+        let (columns, row_count) = match mapping {
+            Equirectangular::YUp => (image.width as usize, image.height as usize),
+            // Between aligned corners there is one cell less than there are pixels.
+            Equirectangular::Aris => ((image.width as usize - 1).max(1), (image.height as usize - 1).max(1)),
+        };
+        let row_cosines = (0..=row_count)
+            .map(|row| Real::cos(std::f64::consts::PI * row as f64 / row_count as f64) as f32)
+            .collect();
+        let mut map = Self {
+            image,
+            mapping,
+            rotation: [Real::sin(rotation), Real::cos(rotation)],
+            columns,
+            row_cosines,
+            rows: Distribution::new(&[]),
+            in_row: Vec::new(),
+        };
+        let mut row_weights = Vec::with_capacity(row_count);
+        for row in 0..row_count {
+            let weights: Vec<f64> =
+                (0..columns).map(|column| map.cell_luminance(column, row, row_count, scale)).collect();
+            let band = f64::from(map.row_cosines[row]) - f64::from(map.row_cosines[row + 1]);
+            row_weights.push(weights.iter().sum::<f64>() * band);
+            map.in_row.push(Distribution::new(&weights));
+        }
+        map.rows = Distribution::new(&row_weights);
+        let cell_azimuth = std::f64::consts::TAU / columns as f64;
+        (map, row_weights.iter().sum::<f64>() * cell_azimuth)
+    }
+
+    /// The mean luminance over a cell's azimuths and polar angles. Interpolation is bilinear within the cell's quarters, so corners, edge middles and centre
+    /// weighted 1:2:4 give it exactly, and it is 0 only where the whole cell is black.
+    fn cell_luminance(&self, column: usize, row: usize, rows: usize, scale: Rgb) -> f64 {
+        let mut sum = 0.0;
+        for (j, wj) in [(0.0, 1.0), (0.5, 2.0), (1.0, 1.0)] {
+            for (i, wi) in [(0.0, 1.0), (0.5, 2.0), (1.0, 1.0)] {
+                let u = (column as f32 + i) / self.columns as f32;
+                let v = (row as f32 + j) / rows as f32;
+                sum += wi * wj * f64::from((self.interpolate(Vec2::new(u, v)) * scale).luminance());
+            }
+        }
+        sum / 16.0
+    }
+
+    /// The interpolated image at (u, v) in [0, 1]², v from the top.
+    fn interpolate(&self, uv: Vec2) -> Rgb {
+        let (w, h) = (self.image.width, self.image.height);
+        let (x, y, wrap) = match self.mapping {
+            Equirectangular::YUp => (uv.x * w as f32 - 0.5, uv.y * h as f32 - 0.5, Wrap::Repeat),
+            Equirectangular::Aris => (uv.x * (w - 1) as f32, uv.y * (h - 1) as f32, Wrap::Clamp),
+        };
+        let (x0, y0) = (x.floor(), y.floor());
+        let (tx, ty) = (x - x0, y - y0);
+        let fetch = |dx: i64, dy: i64| {
+            let x = wrap.pixel(x0 as i64 + dx, w);
+            self.image.texel(x, Wrap::Clamp.pixel(y0 as i64 + dy, h), Encoding::Linear).color
+        };
+        fetch(0, 0).lerp(fetch(1, 0), tx).lerp(fetch(0, 1).lerp(fetch(1, 1), tx), ty)
+    }
+
+    /// Azimuth fraction u, and cosine of the polar angle from the top.
+    fn coordinates(&self, wi: Vec3) -> (f32, f32) {
+        let [sin, cos] = self.rotation;
+        match self.mapping {
+            Equirectangular::YUp => {
+                // The image turns by the rotation, the look-up against it.
+                let (x, z) = (wi.x * cos - wi.z * sin, wi.x * sin + wi.z * cos);
+                (0.5 + Real::atan2(z, x) / TAU, wi.y)
+            }
+            Equirectangular::Aris => {
+                let (x, y) = (wi.x * cos + wi.y * sin, wi.y * cos - wi.x * sin);
+                (0.5 - Real::atan2(y, x) / TAU, wi.z)
+            }
+        }
+    }
+
+    fn direction(&self, u: f32, cos_theta: f32) -> Vec3 {
+        let [sin, cos] = self.rotation;
+        let r = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+        match self.mapping {
+            Equirectangular::YUp => {
+                let phi = TAU * (u - 0.5);
+                let (x, z) = (r * Real::cos(phi), r * Real::sin(phi));
+                Vec3::new(x * cos + z * sin, cos_theta, z * cos - x * sin)
+            }
+            Equirectangular::Aris => {
+                let phi = TAU * (0.5 - u);
+                let (x, y) = (r * Real::cos(phi), r * Real::sin(phi));
+                Vec3::new(x * cos - y * sin, y * cos + x * sin, cos_theta)
+            }
+        }
+    }
+
+    fn look_up(&self, wi: Vec3) -> Rgb {
+        let (u, cos_theta) = self.coordinates(wi);
+        self.interpolate(Vec2::new(u, Real::acos(cos_theta.clamp(-1.0, 1.0)) / PI))
+    }
+
+    fn sample(&self, u: [f32; 2]) -> Option<(Vec3, f32)> {
+        let (row, in_row) = self.rows.sample_with_rest(u[1])?;
+        let (column, in_column) = self.in_row[row].sample_with_rest(u[0])?;
+        let (top, bottom) = (self.row_cosines[row], self.row_cosines[row + 1]);
+        let wi =
+            self.direction((column as f32 + in_column) / self.columns as f32, top + (bottom - top) * in_row);
+        Some((wi.normalize(), self.cell_pdf(column, row)))
+    }
+
+    fn pdf(&self, wi: Vec3) -> f32 {
+        let (u, cos_theta) = self.coordinates(wi);
+        let column = ((u * self.columns as f32) as usize).min(self.columns - 1);
+        let below = self.row_cosines.partition_point(|&c| c >= cos_theta);
+        let row = below.clamp(1, self.in_row.len()) - 1;
+        self.cell_pdf(column, row)
+    }
+
+    /// Constant over a cell, per unit solid angle.
+    fn cell_pdf(&self, column: usize, row: usize) -> f32 {
+        let solid_angle = (self.row_cosines[row] - self.row_cosines[row + 1]) * TAU / self.columns as f32;
+        self.rows.probability(row) * self.in_row[row].probability(column) / solid_angle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::{combine, unit_f32};
+    use crate::scene::ImageId;
+    use crate::scene::texture::Pixels;
+
+    fn image(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> Arc<Image> {
+        let pixels =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
+        Arc::new(Image { name: "test".into(), width, height, channels: 1, pixels: Pixels::F32(pixels) })
+    }
+
+    fn light(image: &Arc<Image>, mapping: Equirectangular, rotation: f32) -> EnvironmentLight {
+        let map = EnvironmentMap::Image { image: ImageId(0), mapping };
+        EnvironmentLight::new(&Environment { map, color: Rgb::WHITE, intensity: 1.0, rotation }, Some(image))
+    }
+
+    fn random(i: u32, salt: u64) -> f32 {
+        unit_f32(combine(u64::from(i), salt) as u32)
+    }
+
+    /// Both sides of E[f/pdf] = ∫ f: with a sun of one pixel, black halves and both mappings.
+    #[test]
+    fn sampled_and_uniform_integrals_agree() {
+        let picture =
+            image(16, 8, |x, y| if (x, y) == (5, 2) { 500.0 } else { (x % 3) as f32 * f32::from(y < 5) });
+        for mapping in [Equirectangular::YUp, Equirectangular::Aris] {
+            let light = light(&picture, mapping, 0.7);
+            let f = |wi: Vec3| f64::from(light.radiance(wi).r) * f64::from(wi.x + 1.5);
+            let n = 200_000;
+            let uniform: f64 =
+                (0..n).map(|i| f(warp::uniform_sphere([random(i, 1), random(i, 2)]).into())).sum::<f64>()
+                    * 4.0
+                    * std::f64::consts::PI
+                    / f64::from(n);
+            let sampled: f64 = (0..n)
+                .filter_map(|i| light.sample([random(i, 3), random(i, 4)]))
+                .map(|(wi, _, pdf)| f(wi) / f64::from(pdf))
+                .sum::<f64>()
+                / f64::from(n);
+            assert!((uniform - sampled).abs() < 0.03 * sampled, "{mapping:?}: {uniform} {sampled}");
+        }
+    }
+
+    #[test]
+    fn total_is_the_integral_over_the_sphere() {
+        let picture = image(64, 32, |x, y| (x % 5 + y) as f32);
+        for mapping in [Equirectangular::YUp, Equirectangular::Aris] {
+            let light = light(&picture, mapping, 0.3);
+            let n = 100_000;
+            let sum: f64 = (0..n)
+                .map(|i| {
+                    f64::from(light.radiance(warp::uniform_sphere([random(i, 1), random(i, 2)]).into()).r)
+                })
+                .sum();
+            let total = sum * 4.0 * std::f64::consts::PI / f64::from(n);
+            assert!((total - light.total_luminance()).abs() < 0.01 * total, "{mapping:?}");
+        }
+    }
+
+    #[test]
+    fn pdf_is_that_of_the_sample() {
+        let picture = image(32, 16, |x, y| (x + y * y) as f32);
+        for mapping in [Equirectangular::YUp, Equirectangular::Aris] {
+            let light = light(&picture, mapping, -1.2);
+            let mut off = 0;
+            for i in 0..2000 {
+                let (wi, _, pdf) = light.sample([random(i, 3), random(i, 4)]).unwrap();
+                // Rounding may carry a direction over a cell's edge.
+                off += u32::from((light.pdf(wi) - pdf).abs() > 1e-3 * pdf);
+            }
+            assert!(off < 4, "{mapping:?}: {off}");
+        }
+    }
+
+    #[test]
+    fn nothing_bright_is_impossible() {
+        let picture = image(8, 4, |x, y| f32::from((x, y) == (0, 1)));
+        let light = light(&picture, Equirectangular::YUp, 0.0);
+        for i in 0..5000 {
+            let wi: Vec3 = warp::uniform_sphere([random(i, 1), random(i, 2)]).into();
+            assert!(light.radiance(wi).r == 0.0 || light.pdf(wi) > 0.0, "{wi}");
+        }
+    }
+
+    #[test]
+    fn directions_and_rotation_follow_the_convention() {
+        // A bright column at u = ½ + 1/16, that is towards +x turned a little to +z.
+        let picture = image(8, 4, |x, _| f32::from(x == 4));
+        let straight = light(&picture, Equirectangular::YUp, 0.0);
+        let angle = TAU / 16.0;
+        let lit = Vec3::new(Real::cos(angle), 0.0, Real::sin(angle));
+        assert!((straight.radiance(lit).r - 1.0).abs() < 1e-5);
+        // Counter-clockwise seen from above takes +z to +x.
+        let turned = light(&picture, Equirectangular::YUp, PI / 2.0);
+        let moved = Vec3::new(lit.z, 0.0, -lit.x);
+        assert!((turned.radiance(moved).r - 1.0).abs() < 1e-5);
+    }
+}
