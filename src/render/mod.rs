@@ -1,1 +1,59 @@
-//! Rendering: preparing a scene, tracing paths, collecting film.
+//! Rendering: a scene is prepared once, paths are traced pixel by pixel, and the film becomes the layers of a raster.
+//!
+//! [`Geometry`] holds what the jobs of a sweep share; [`Prepared`] adds what a job's own materials, lights and camera need.
+
+mod camera;
+mod film;
+mod filter;
+mod geometry;
+mod material;
+mod path;
+mod prepare;
+mod surface;
+
+use crate::accel::BuildError;
+
+pub use film::{Control, Rendered, render};
+pub use geometry::Geometry;
+pub use path::{Replay, ReplayVertex, replay};
+pub use prepare::Prepared;
+
+/// Why a scene can't be rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The tree could not be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// There is nothing to look through.
+    #[error("the scene has no camera")]
+    NoCamera,
+    /// The settings name a camera that isn't there.
+    #[error("there is no camera {name:?}; the scene has {}", known.join(", "))]
+    UnknownCamera {
+        /// The name.
+        name: String,
+        /// The names there are.
+        known: Vec<String>,
+    },
+    /// A setting is out of range.
+    #[error("render.{setting} is {value}, but must be {expected}")]
+    Setting {
+        /// The setting.
+        setting: &'static str,
+        /// What it is.
+        value: String,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// The camera's transform or lens is unusable.
+    #[error("camera {name:?}: {why}")]
+    Camera {
+        /// The camera.
+        name: String,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// Somebody asked to stop.
+    #[error("stopped before the image was finished")]
+    Cancelled,
+}

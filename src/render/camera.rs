@@ -1,0 +1,127 @@
+//! Film positions into rays.
+
+use glam::{Affine3A, Vec2, Vec3};
+
+use super::RenderError;
+use crate::accel::Ray;
+use crate::math::{Real, warp};
+use crate::scene::camera::{Aperture, Camera, FovAxis, Lens, Projection};
+
+/// A camera for an image of a given size.
+#[derive(Debug)]
+pub(super) struct FilmCamera {
+    world_from_camera: Affine3A,
+    /// Unit viewing axis in the world: depth is measured along it.
+    pub(super) axis: Vec3,
+    /// Camera-space x and y per pixel, on the plane one unit away (perspective) or in the film (orthographic).
+    per_pixel: f32,
+    half_size: Vec2,
+    pixel_offset: Vec2,
+    is_perspective: bool,
+    lens: Option<Lens>,
+}
+
+impl FilmCamera {
+    pub(super) fn new(name: &str, camera: &Camera, width: u32, height: u32) -> Result<Self, RenderError> {
+        let wrong = |why| Err(RenderError::Camera { name: name.to_owned(), why });
+        let matrix = camera.world_from_camera.matrix3;
+        if !camera.world_from_camera.is_finite() || matrix.determinant() == 0.0 {
+            return wrong("its transform is not invertible");
+        }
+        let half_size = Vec2::new(width as f32, height as f32) * 0.5;
+        let (per_pixel, is_perspective) = match camera.projection {
+            Projection::Perspective { fov, axis } => {
+                if !(fov > 0.0 && fov < std::f32::consts::PI) {
+                    return wrong("its angle of view must be between 0 and 180 degrees");
+                }
+                let half = if axis == FovAxis::X { half_size.x } else { half_size.y };
+                (Real::sin(fov * 0.5) / (Real::cos(fov * 0.5) * half), true)
+            }
+            Projection::Orthographic { half_height } => {
+                if !(half_height > 0.0 && half_height.is_finite()) {
+                    return wrong("the height of its view must be above 0");
+                }
+                (half_height / half_size.y, false)
+            }
+        };
+        if camera.lens.is_some_and(|l| !(l.focal_distance > 0.0 && l.radius >= 0.0)) {
+            return wrong("its focal distance must be above 0 and its lens radius not below 0");
+        }
+        Ok(Self {
+            world_from_camera: camera.world_from_camera,
+            axis: Vec3::from(-matrix.z_axis).normalize(),
+            per_pixel,
+            half_size,
+            pixel_offset: camera.pixel_offset,
+            is_perspective,
+            lens: camera.lens.filter(|l| l.radius > 0.0),
+        })
+    }
+
+    /// The ray of a film position in pixels from the top left corner; its direction has unit length.
+    pub(super) fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Ray {
+        let p = film + self.pixel_offset - self.half_size;
+        let on_plane = Vec3::new(p.x * self.per_pixel, -p.y * self.per_pixel, 0.0);
+        let (mut origin, mut direction) =
+            if self.is_perspective { (Vec3::ZERO, on_plane - Vec3::Z) } else { (on_plane, -Vec3::Z) };
+        if let Some(lens) = self.lens {
+            let focus = origin + direction * lens.focal_distance;
+            let [x, y] = match lens.shape {
+                Aperture::Disk => warp::concentric_disk(u_lens),
+                Aperture::Square => u_lens.map(|u| 2.0 * u - 1.0),
+            };
+            origin += Vec3::new(x, y, 0.0) * lens.radius;
+            direction = focus - origin;
+        }
+        Ray::new(
+            self.world_from_camera.transform_point3(origin),
+            self.world_from_camera.transform_vector3(direction).normalize(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(fov: f32, axis: FovAxis) -> Camera {
+        let mut c = Camera::look_at(Vec3::ZERO, -Vec3::Z, Vec3::Y, fov);
+        c.projection = Projection::Perspective { fov, axis };
+        c
+    }
+
+    #[test]
+    fn edges_of_the_film_see_half_the_angle_of_view() {
+        let fov = std::f32::consts::FRAC_PI_2;
+        let film = FilmCamera::new("c", &camera(fov, FovAxis::Y), 200, 100).unwrap();
+        let top = film.ray(Vec2::new(100.0, 0.0), [0.5; 2]).direction;
+        assert!((top - Vec3::new(0.0, 1.0, -1.0).normalize()).length() < 1e-6);
+        let film = FilmCamera::new("c", &camera(fov, FovAxis::X), 200, 100).unwrap();
+        let right = film.ray(Vec2::new(200.0, 50.0), [0.5; 2]).direction;
+        assert!((right - Vec3::new(1.0, 0.0, -1.0).normalize()).length() < 1e-6);
+    }
+
+    #[test]
+    fn rays_through_a_lens_meet_in_the_focal_plane() {
+        for shape in [Aperture::Disk, Aperture::Square] {
+            let mut c = camera(0.6, FovAxis::Y);
+            c.lens = Some(Lens { radius: 0.2, focal_distance: 3.0, shape });
+            let film = FilmCamera::new("c", &c, 64, 48).unwrap();
+            let at_focus = |u| {
+                let ray = film.ray(Vec2::new(10.0, 7.0), u);
+                ray.origin + ray.direction * (-3.0 - ray.origin.z) / ray.direction.z
+            };
+            assert!((at_focus([0.1, 0.9]) - at_focus([0.8, 0.3])).length() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn unusable_cameras_are_refused() {
+        for fov in [0.0, -1.0, 3.2, f32::NAN] {
+            assert!(FilmCamera::new("c", &camera(fov, FovAxis::Y), 4, 4).is_err());
+        }
+        let mut flat = camera(0.6, FovAxis::Y);
+        flat.world_from_camera.matrix3.x_axis = glam::Vec3A::ZERO;
+        assert!(FilmCamera::new("c", &flat, 4, 4).is_err());
+    }
+}

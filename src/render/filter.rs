@@ -1,0 +1,111 @@
+//! Pixel filters, sampled by importance: every sample weighs the same and belongs to one pixel.
+
+use crate::math::Real;
+use crate::settings::Filter;
+
+/// A separable filter as the inverse of its cumulative distribution along one axis.
+#[derive(Clone, Debug)]
+pub(super) enum FilterSampler {
+    Box {
+        radius: f32,
+    },
+    Tent {
+        radius: f32,
+    },
+    /// Offsets at equal steps of the cumulative distribution.
+    Tabulated(Vec<f32>),
+}
+
+/// Steps of a tabulated filter: its curve is followed to 1e-5 of its radius.
+const STEPS: usize = 1024;
+
+impl FilterSampler {
+    /// `radius` is in pixels; each filter has its own default.
+    pub(super) fn new(filter: Filter, radius: Option<f32>) -> Self {
+        match filter {
+            Filter::Box => Self::Box { radius: radius.unwrap_or(0.5) },
+            Filter::Tent => Self::Tent { radius: radius.unwrap_or(1.0) },
+            Filter::BlackmanHarris => {
+                let radius = f64::from(radius.unwrap_or(0.75));
+                Self::Tabulated(invert(&blackman_harris).iter().map(|x| (x * radius) as f32).collect())
+            }
+        }
+    }
+
+    /// The offset from the pixel's centre, in pixels.
+    #[inline]
+    pub(super) fn offset(&self, u: f32) -> f32 {
+        match self {
+            Self::Box { radius } => (2.0 * u - 1.0) * radius,
+            Self::Tent { radius } => {
+                let x = if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() };
+                x * radius
+            }
+            Self::Tabulated(table) => {
+                let position = u * STEPS as f32;
+                let i = (position as usize).min(STEPS - 1);
+                let t = position - i as f32;
+                table[i] * (1.0 - t) + table[i + 1] * t
+            }
+        }
+    }
+}
+
+/// The four-term Blackman-Harris window over [-1, 1] (Harris 1978).
+fn blackman_harris(x: f64) -> f64 {
+    let phase = std::f64::consts::PI * (x + 1.0);
+    0.35875 - 0.48829 * Real::cos(phase) + 0.14128 * Real::cos(2.0 * phase) - 0.01168 * Real::cos(3.0 * phase)
+}
+
+/// Where the integral of `density` over [-1, 1] reaches 0, 1/STEPS, …, 1 of its total.
+fn invert(density: &dyn Fn(f64) -> f64) -> Vec<f64> {
+    let fine = 64 * STEPS;
+    let width = 2.0 / fine as f64;
+    let mut cumulative = vec![0.0; fine + 1];
+    for i in 0..fine {
+        cumulative[i + 1] = cumulative[i] + density(-1.0 + (i as f64 + 0.5) * width).max(0.0) * width;
+    }
+    let total = cumulative[fine];
+    (0..=STEPS)
+        .map(|step| {
+            let wanted = total * step as f64 / STEPS as f64;
+            let i = cumulative.partition_point(|&c| c < wanted).clamp(1, fine) - 1;
+            let inside = cumulative[i + 1] - cumulative[i];
+            let t = if inside > 0.0 { (wanted - cumulative[i]) / inside } else { 0.0 };
+            -1.0 + (i as f64 + t) * width
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean and variance of the offsets against the filter's own moments by quadrature.
+    #[test]
+    fn offsets_have_the_filter_s_moments() {
+        let kernels: [(Filter, &dyn Fn(f64) -> f64, f64); 3] = [
+            (Filter::Box, &|_| 1.0, 0.5),
+            (Filter::Tent, &|x: f64| 1.0 - x.abs(), 1.0),
+            (Filter::BlackmanHarris, &blackman_harris, 0.75),
+        ];
+        for (filter, kernel, radius) in kernels {
+            let n = 20_000;
+            let (mut mass, mut second) = (0.0, 0.0);
+            for i in 0..n {
+                let x = -1.0 + 2.0 * (f64::from(i) + 0.5) / f64::from(n);
+                mass += kernel(x);
+                second += kernel(x) * (x * radius) * (x * radius);
+            }
+            let sampler = FilterSampler::new(filter, None);
+            let (mut mean, mut variance) = (0.0, 0.0);
+            for i in 0..n {
+                let x = f64::from(sampler.offset((i as f32 + 0.5) / n as f32));
+                mean += x / f64::from(n);
+                variance += x * x / f64::from(n);
+            }
+            assert!(mean.abs() < 1e-4, "{filter:?}");
+            assert!((variance - second / mass).abs() < 1e-3 * variance, "{filter:?}: {variance}");
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! All triangles of a scene in world space, with the way back from a triangle to its mesh.
+
+use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
+use std::sync::Arc;
+
+use super::RenderError;
+use crate::accel::{Bvh, Hit};
+use crate::scene::{MaterialId, Mesh, Scene};
+
+/// The triangles of a scene and the tree over them. It depends on meshes and instances alone, so that jobs that differ in
+/// materials, lights or camera share it.
+#[derive(Debug)]
+pub struct Geometry {
+    pub(super) bvh: Bvh,
+    /// World positions, by triangle.
+    vertices: Vec<[Vec3; 3]>,
+    /// The instance and the triangle's index in its mesh.
+    origins: Vec<(u32, u32)>,
+    instances: Vec<PlacedMesh>,
+    /// Centre and radius (at least a tiny one) of a sphere around everything.
+    pub(super) center: Vec3,
+    pub(super) radius: f32,
+}
+
+#[derive(Debug)]
+struct PlacedMesh {
+    mesh: Arc<Mesh>,
+    world_from_object: Affine3A,
+    /// The inverse transpose: takes object normals to world.
+    normal_matrix: Mat3,
+    /// -1 where the transform mirrors, which turns the winding round.
+    handedness: f32,
+}
+
+/// The corner data of a hit triangle, interpolated on demand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TrianglePoint<'a> {
+    placed: &'a PlacedMesh,
+    corners: [usize; 3],
+    barycentric: [f32; 3],
+    world: [Vec3; 3],
+}
+
+impl Geometry {
+    /// Flattens the scene's instances and builds the tree.
+    ///
+    /// # Errors
+    /// [`RenderError::Build`] where there are too many triangles.
+    pub fn build<M>(scene: &Scene<M>) -> Result<Self, RenderError> {
+        let count = scene.triangle_count();
+        let mut vertices = Vec::with_capacity(count);
+        let mut origins = Vec::with_capacity(count);
+        let mut instances = Vec::with_capacity(scene.instances.len());
+        for (i, instance) in scene.instances.iter().enumerate() {
+            let mesh = &scene.meshes[instance.mesh.0 as usize];
+            let to_world = instance.world_from_object;
+            for (k, corners) in mesh.triangles.iter().enumerate() {
+                vertices.push(corners.map(|c| to_world.transform_point3(mesh.positions[c as usize])));
+                origins.push((i as u32, k as u32));
+            }
+            instances.push(PlacedMesh {
+                mesh: Arc::clone(mesh),
+                world_from_object: to_world,
+                normal_matrix: Mat3::from(to_world.matrix3).inverse().transpose(),
+                handedness: if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
+            });
+        }
+        let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
+        let center = low * 0.5 + high * 0.5;
+        Ok(Self {
+            bvh: Bvh::build(&vertices)?,
+            vertices,
+            origins,
+            instances,
+            center,
+            radius: (high - center).length().max(f32::MIN_POSITIVE),
+        })
+    }
+
+    /// The number of triangles, instances counted.
+    pub fn triangle_count(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// The instance of a triangle.
+    pub(super) fn instance_of(&self, triangle: u32) -> usize {
+        self.origins[triangle as usize].0 as usize
+    }
+
+    /// World positions and counter-clockwise orientation seen from the front, for the lights.
+    pub(super) fn front_facing(&self, triangle: u32) -> [Vec3; 3] {
+        let v = self.vertices[triangle as usize];
+        if self.instances[self.instance_of(triangle)].handedness < 0.0 { [v[0], v[2], v[1]] } else { v }
+    }
+
+    /// Triangles with their instance's material.
+    pub(super) fn materials<'a, M>(
+        &'a self,
+        scene: &'a Scene<M>,
+    ) -> impl Iterator<Item = (u32, MaterialId)> + 'a {
+        self.origins.iter().enumerate().map(|(t, &(i, _))| (t as u32, scene.instances[i as usize].material))
+    }
+
+    /// The data at a hit.
+    #[inline]
+    pub(super) fn at(&self, hit: &Hit) -> TrianglePoint<'_> {
+        self.point_on(hit.triangle, hit.barycentric)
+    }
+
+    /// The data at a point of a triangle.
+    #[inline]
+    pub(super) fn point_on(&self, triangle: u32, barycentric: [f32; 3]) -> TrianglePoint<'_> {
+        let (instance, index) = self.origins[triangle as usize];
+        let placed = &self.instances[instance as usize];
+        TrianglePoint {
+            placed,
+            corners: placed.mesh.triangles[index as usize].map(|c| c as usize),
+            barycentric,
+            world: self.vertices[triangle as usize],
+        }
+    }
+}
+
+impl TrianglePoint<'_> {
+    /// The world position, and how far rounding may have moved it per axis: γ(7)·Σ|bᵢpᵢ| (Pharr, Jakob and Humphreys,
+    /// "Physically Based Rendering", 4th ed., section 6.8.4).
+    #[inline]
+    pub(super) fn position(&self) -> (Vec3, Vec3) {
+        const GAMMA_7: f32 = 7.0 * (f32::EPSILON * 0.5) / (1.0 - 7.0 * (f32::EPSILON * 0.5));
+        let parts = [0, 1, 2].map(|i| self.world[i] * self.barycentric[i]);
+        let error = parts[0].abs() + parts[1].abs() + parts[2].abs();
+        (parts[0] + parts[1] + parts[2], error * GAMMA_7)
+    }
+
+    /// The unit geometric normal of the front side.
+    #[inline]
+    pub(super) fn geometric_normal(&self) -> Vec3 {
+        let [a, b, c] = self.world;
+        let (e1, e2) = (b - a, c - a);
+        // Scaled first: the product of two tiny edges would underflow.
+        let scale = e1.abs().max_element().max(e2.abs().max_element());
+        (e1 / scale).cross(e2 / scale).normalize_or(Vec3::Z) * self.placed.handedness
+    }
+
+    /// The unit shading normal, on the front side: interpolated, or the geometric one where the mesh has none.
+    #[inline]
+    pub(super) fn shading_normal(&self, geometric: Vec3) -> Vec3 {
+        let normals = &self.placed.mesh.normals;
+        if normals.is_empty() {
+            return geometric;
+        }
+        let object = self.interpolate(|c| normals[c]);
+        (self.placed.normal_matrix * object).try_normalize().unwrap_or(geometric)
+    }
+
+    /// The coordinates of a set, (0, 0) where the mesh has no such set.
+    #[inline]
+    pub(super) fn uv(&self, set: u32) -> Vec2 {
+        let Some(uvs) = self.placed.mesh.uvs.get(set as usize) else { return Vec2::ZERO };
+        let [b0, b1, b2] = self.barycentric;
+        let [c0, c1, c2] = self.corners;
+        uvs[c0] * b0 + uvs[c1] * b1 + uvs[c2] * b2
+    }
+
+    /// The vertex colour, white where the mesh has none.
+    #[inline]
+    pub(super) fn color(&self) -> Vec4 {
+        let colors = &self.placed.mesh.colors;
+        if colors.is_empty() {
+            return Vec4::ONE;
+        }
+        let [b0, b1, b2] = self.barycentric;
+        let [c0, c1, c2] = self.corners;
+        colors[c0] * b0 + colors[c1] * b1 + colors[c2] * b2
+    }
+
+    /// The world tangent (not orthogonal to the normal) and the bitangent's sign: the mesh's own, else along growing u of the
+    /// set. None where neither gives a direction.
+    pub(super) fn tangent(&self, set: u32) -> Option<(Vec3, f32)> {
+        let mesh = &self.placed.mesh;
+        if !mesh.tangents.is_empty() {
+            let object = self.interpolate(|c| mesh.tangents[c].truncate());
+            let world = self.placed.world_from_object.transform_vector3(object).try_normalize()?;
+            return Some((world, mesh.tangents[self.corners[0]].w * self.placed.handedness));
+        }
+        let uvs = mesh.uvs.get(set as usize)?;
+        let [t0, t1, t2] = self.corners.map(|c| uvs[c]);
+        let (d1, d2) = (t1 - t0, t2 - t0);
+        let (e1, e2) = (self.world[1] - self.world[0], self.world[2] - self.world[0]);
+        let det = d1.perp_dot(d2);
+        let tangent = ((e1 * d2.y - e2 * d1.y) * det.signum()).try_normalize()?;
+        // v grows downwards in the image while tangent space has +y up.
+        Some((tangent, -det.signum() * self.placed.handedness))
+    }
+
+    #[inline]
+    fn interpolate(&self, corner: impl Fn(usize) -> Vec3) -> Vec3 {
+        let [b0, b1, b2] = self.barycentric;
+        corner(self.corners[0]) * b0 + corner(self.corners[1]) * b1 + corner(self.corners[2]) * b2
+    }
+}

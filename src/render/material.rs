@@ -1,0 +1,291 @@
+//! Materials as the tracer reads them: what is the same everywhere is worked out once.
+
+use glam::Vec3;
+
+use super::geometry::TrianglePoint;
+use crate::color::Rgb;
+use crate::disney::{Bsdf, Model, Parameter, Params};
+use crate::math::{Frame, Real};
+use crate::scene::material::{Material, NormalMap, Param, ShadingFrame, Sides, TextureChannel, TextureMap};
+use crate::scene::{Scene, texture::Texel};
+
+/// A material, prepared.
+#[derive(Debug)]
+pub(super) struct PreparedMaterial {
+    bsdf: Scattering,
+    emission: Emitting,
+    opacity: Covering,
+    normal_map: Option<NormalMap>,
+    tangent: Tangent,
+    pub(super) sides: Sides,
+    /// Light goes through: the inside is a place of its own.
+    pub(super) is_interface: bool,
+}
+
+#[derive(Debug)]
+enum Scattering {
+    Constant(Bsdf),
+    Varying(Box<Material>),
+}
+
+#[derive(Debug)]
+enum Emitting {
+    Nothing,
+    Constant(Rgb, Sides),
+    Varying(Param<Rgb>, f32, Sides),
+}
+
+#[derive(Debug)]
+enum Covering {
+    Opaque,
+    Varying { alpha: Param<f32>, cutoff: Option<f32>, vertex_color: bool },
+}
+
+/// Where the shading frame's x axis comes from.
+#[derive(Debug)]
+enum Tangent {
+    /// Nothing depends on it.
+    Any,
+    Surface {
+        uv_set: u32,
+        rotation: f32,
+    },
+    Nori {
+        rotation: f32,
+    },
+}
+
+impl PreparedMaterial {
+    pub(super) fn new(material: &Material) -> Self {
+        let varies = material.vertex_color
+            || material.base_color.constant().is_none()
+            || material.scalars.iter().any(|s| s.constant().is_none());
+        let bsdf = if varies && matches!(material.model, Model::Disney | Model::Diffuse) {
+            Scattering::Varying(Box::new(material.clone()))
+        } else {
+            let base_color = material.base_color.constant().unwrap_or(Rgb::WHITE);
+            let scalar = |p: Parameter| material.scalar(p).constant().unwrap_or(p.default());
+            Scattering::Constant(scatter(material, base_color, scalar))
+        };
+        let emission = match (&material.emission.color, material.emits()) {
+            (_, false) => Emitting::Nothing,
+            (Param::Constant(color), true) => {
+                Emitting::Constant(*color * material.emission.strength, material.emission.sides)
+            }
+            (varying, true) => {
+                Emitting::Varying(varying.clone(), material.emission.strength, material.emission.sides)
+            }
+        };
+        Self {
+            bsdf,
+            emission,
+            opacity: covering(material),
+            normal_map: material.normal_map.clone(),
+            tangent: tangent(material),
+            sides: material.sides,
+            is_interface: material.model == Model::Dielectric,
+        }
+    }
+
+    /// The parameters are the same everywhere.
+    pub(super) fn is_constant(&self) -> bool {
+        matches!(self.bsdf, Scattering::Constant(_))
+    }
+
+    /// It blocks all light that reaches it from outside.
+    pub(super) fn is_opaque(&self) -> bool {
+        matches!(self.opacity, Covering::Opaque)
+    }
+
+    /// The mean radiance of an emitting material and the sides that emit: for choosing lights.
+    pub(super) fn mean_emission(&self, scene: &Scene) -> Option<(Rgb, Sides)> {
+        match &self.emission {
+            Emitting::Nothing => None,
+            Emitting::Constant(radiance, sides) => Some((*radiance, *sides)),
+            Emitting::Varying(Param::Constant(color), strength, sides) => Some((*color * *strength, *sides)),
+            Emitting::Varying(Param::Texture { map, factor }, strength, sides) => {
+                Some((mean_color(scene, map) * *factor * *strength, *sides))
+            }
+        }
+    }
+
+    /// The radiance that leaves the surface, towards the front or the back.
+    #[inline]
+    pub(super) fn emitted(&self, scene: &Scene, at: &TrianglePoint<'_>, towards_front: bool) -> Rgb {
+        let leaves = |sides: Sides| towards_front || sides == Sides::Both;
+        match &self.emission {
+            Emitting::Nothing => Rgb::BLACK,
+            Emitting::Constant(radiance, sides) if leaves(*sides) => *radiance,
+            Emitting::Varying(color, strength, sides) if leaves(*sides) => read_color(scene, color, at) * *strength,
+            Emitting::Constant(..) | Emitting::Varying(..) => Rgb::BLACK,
+        }
+    }
+
+    /// The fraction of the surface that is there, in [0, 1].
+    #[inline]
+    pub(super) fn alpha(&self, scene: &Scene, at: &TrianglePoint<'_>) -> f32 {
+        match &self.opacity {
+            Covering::Opaque => 1.0,
+            Covering::Varying { alpha, cutoff, vertex_color } => {
+                let mut value = read_scalar(scene, alpha, at);
+                if *vertex_color {
+                    value *= at.color().w;
+                }
+                match cutoff {
+                    Some(cutoff) => f32::from(value >= *cutoff),
+                    None => value.clamp(0.0, 1.0),
+                }
+            }
+        }
+    }
+
+    /// The BSDF at a point.
+    #[inline]
+    pub(super) fn bsdf(&self, scene: &Scene, at: &TrianglePoint<'_>) -> Bsdf {
+        match &self.bsdf {
+            Scattering::Constant(bsdf) => *bsdf,
+            Scattering::Varying(material) => {
+                let mut base_color = read_color(scene, &material.base_color, at);
+                if material.vertex_color {
+                    let c = at.color();
+                    base_color *= Rgb::new(c.x, c.y, c.z);
+                }
+                // Products of factors, textures and vertex colours may leave the range by their own rounding or by intent.
+                let base_color = base_color.map(|v| v.clamp(0.0, 1.0));
+                scatter(material, base_color, |p| {
+                    read_scalar(scene, material.scalar(p), at).clamp(0.0, p.max())
+                })
+            }
+        }
+    }
+
+    /// The shading frame around `normal`, which may be turned to the viewer; `is_front` tells which side that is.
+    #[inline]
+    pub(super) fn frame(&self, scene: &Scene, at: &TrianglePoint<'_>, normal: Vec3, is_front: bool) -> Frame {
+        let normal = match &self.normal_map {
+            None => normal,
+            Some(map) => self.mapped_normal(scene, map, at, normal, is_front),
+        };
+        match self.tangent {
+            Tangent::Any => Frame::from_normal(normal),
+            Tangent::Nori { rotation } => Frame::nori(normal).rotated(rotation),
+            Tangent::Surface { uv_set, rotation } => match at.tangent(uv_set) {
+                Some((tangent, _)) => Frame::from_normal_and_tangent(normal, tangent).rotated(rotation),
+                None => Frame::from_normal(normal).rotated(rotation),
+            },
+        }
+    }
+
+    /// The normal of a tangent-space map (glTF 2.0, section 3.9.3), on the side of `normal`.
+    fn mapped_normal(
+        &self,
+        scene: &Scene,
+        map: &NormalMap,
+        at: &TrianglePoint<'_>,
+        normal: Vec3,
+        is_front: bool,
+    ) -> Vec3 {
+        let Some((tangent, sign)) = at.tangent(map.map.uv_set) else { return normal };
+        let side = if is_front { 1.0 } else { -1.0 };
+        let front = normal * side;
+        let frame = Frame::from_normal_and_tangent(front, tangent);
+        let texel = read_texel(scene, &map.map, at).color;
+        let (x, y, z) = (
+            (2.0 * texel.r - 1.0) * map.scale,
+            (2.0 * texel.g - 1.0) * map.scale,
+            2.0 * texel.b - 1.0,
+        );
+        let mapped = frame.tangent * x + frame.bitangent * (y * sign) + front * z;
+        mapped.try_normalize().map_or(normal, |n| n * side)
+    }
+}
+
+fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f32) -> Bsdf {
+    match material.model {
+        Model::Disney => {
+            let mut params = Params { base_color, ..Params::default() };
+            for p in Parameter::ALL {
+                *params.get_mut(p) = scalar(p);
+            }
+            Bsdf::disney(&params, material.masking, material.diffuse)
+        }
+        Model::Diffuse => Bsdf::diffuse(base_color),
+        Model::Mirror => Bsdf::mirror(),
+        Model::Dielectric => Bsdf::dielectric(material.ior),
+    }
+}
+
+fn covering(material: &Material) -> Covering {
+    let opacity = &material.opacity;
+    let opaque = match opacity.alpha.constant() {
+        Some(alpha) if !material.vertex_color => alpha >= opacity.cutoff.unwrap_or(1.0),
+        _ => false,
+    };
+    if opaque {
+        return Covering::Opaque;
+    }
+    Covering::Varying {
+        alpha: opacity.alpha.clone(),
+        cutoff: opacity.cutoff,
+        vertex_color: material.vertex_color,
+    }
+}
+
+fn tangent(material: &Material) -> Tangent {
+    let anisotropic = material.model == Model::Disney
+        && material.scalar(Parameter::Anisotropic).constant().is_none_or(|a| a > 0.0);
+    if !anisotropic {
+        return Tangent::Any;
+    }
+    match material.frame {
+        ShadingFrame::Nori => Tangent::Nori { rotation: material.rotation },
+        ShadingFrame::Surface => Tangent::Surface {
+            uv_set: material.normal_map.as_ref().map_or(0, |m| m.map.uv_set),
+            rotation: material.rotation,
+        },
+    }
+}
+
+#[inline]
+fn read_texel(scene: &Scene, map: &TextureMap, at: &TrianglePoint<'_>) -> Texel {
+    let texture = &scene.textures[map.texture.0 as usize];
+    texture.sample(&scene.images[texture.image.0 as usize], map.coordinates(at.uv(map.uv_set)))
+}
+
+#[inline]
+fn read_color(scene: &Scene, param: &Param<Rgb>, at: &TrianglePoint<'_>) -> Rgb {
+    match param {
+        Param::Constant(value) => *value,
+        Param::Texture { map, factor } => read_texel(scene, map, at).color * *factor,
+    }
+}
+
+#[inline]
+fn read_scalar(scene: &Scene, param: &Param<f32>, at: &TrianglePoint<'_>) -> f32 {
+    match param {
+        Param::Constant(value) => *value,
+        Param::Texture { map, factor } => {
+            let texel = read_texel(scene, map, at);
+            factor
+                * match map.channel {
+                    TextureChannel::R => texel.color.r,
+                    TextureChannel::G => texel.color.g,
+                    TextureChannel::B => texel.color.b,
+                    TextureChannel::A => texel.alpha,
+                }
+        }
+    }
+}
+
+/// The mean of a whole texture; a little above 0 wherever any texel is, so that no light is impossible to choose.
+fn mean_color(scene: &Scene, map: &TextureMap) -> Rgb {
+    let texture = &scene.textures[map.texture.0 as usize];
+    let image = &scene.images[texture.image.0 as usize];
+    let mut sum = Rgb::<f64>::BLACK;
+    for y in 0..image.height {
+        for x in 0..image.width {
+            sum += image.texel(x, y, texture.encoding).color.cast();
+        }
+    }
+    (sum / (f64::from(image.width) * f64::from(image.height)).max(1.0)).cast()
+}
