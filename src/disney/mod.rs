@@ -1,9 +1,25 @@
 //! The Disney BSDF: parameters with checked ranges, microfacet terms, lobes, `eval`, `sample` and `pdf`.
 //!
+//! [`Bsdf`] is what the integrator sees. Behind it each lobe has a file of its own, with its value, its sampler and the density
+//! of that sampler side by side; `mixture` is the one place that says how often each lobe is sampled.
+//!
 //! Everything is generic over [`crate::math::Real`], so that the `f64` twin the tests measure against is the same source.
 
+mod bsdf;
+mod clearcoat;
+mod dielectric;
+mod diffuse;
+mod fresnel;
+mod microfacet;
+mod mixture;
+mod pair;
 mod parameter;
+mod sheen;
+mod specular;
 
+pub use bsdf::{Bsdf, BsdfSample, Lobe};
+pub use fresnel::{fresnel_dielectric, schlick_weight};
+pub use microfacet::{ALPHA_MIN, Alpha, alpha_from_roughness};
 pub use parameter::{
     BASE_COLOR, DiffuseModel, Masking, Model, OutOfRange, Parameter, Params, check_base_color,
 };

@@ -27,6 +27,20 @@ pub fn cosine_hemisphere_pdf<F: Real>(cos_theta: F) -> F {
     cos_theta.max(F::ZERO) * F::FRAC_1_PI
 }
 
+/// A direction of the upper hemisphere, uniform by solid angle; its pdf is [`uniform_hemisphere_pdf`].
+/// The cosine is above 0 for every u in [0, 1).
+pub fn uniform_hemisphere<F: Real>(u: [F; 2]) -> V3<F> {
+    let z = F::ONE - u[0];
+    let r = (u[0] * (F::ONE + z)).safe_sqrt();
+    let phi = F::of(2.0) * F::PI * u[1];
+    V3::new(r * phi.cos(), r * phi.sin(), z)
+}
+
+/// 1/2π per unit solid angle, above the horizon.
+pub fn uniform_hemisphere_pdf<F: Real>() -> F {
+    F::of(0.5) * F::FRAC_1_PI
+}
+
 /// A direction of the whole sphere; the pdf is 1/4π per unit solid angle.
 pub fn uniform_sphere<F: Real>(u: [F; 2]) -> V3<F> {
     let z = F::ONE - F::of(2.0) * u[0];
@@ -81,6 +95,16 @@ mod tests {
         let mean: f64 = grid(n).map(|u| cosine_hemisphere(u).z).sum::<f64>() / f64::from(n * n);
         assert!((mean - 2.0 / 3.0).abs() < 1e-4, "{mean}");
         assert!((cosine_hemisphere_pdf(1.0f64) - std::f64::consts::FRAC_1_PI).abs() < 1e-15);
+    }
+
+    #[test]
+    fn uniform_hemisphere_has_its_pdf() {
+        // The mean cosine is ½, and 1/(pdf·2π) = 1.
+        let n = 256;
+        let mean: f64 = grid(n).map(|u| uniform_hemisphere(u).z).sum::<f64>() / f64::from(n * n);
+        assert!((mean - 0.5).abs() < 1e-12, "{mean}");
+        assert!((uniform_hemisphere([0.3f64, 0.7]).length() - 1.0).abs() < 1e-15);
+        assert!((uniform_hemisphere_pdf::<f64>() * 2.0 * std::f64::consts::PI - 1.0).abs() < 1e-15);
     }
 
     #[test]

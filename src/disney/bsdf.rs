@@ -1,0 +1,148 @@
+//! The BSDF as the integrator sees it.
+
+use super::dielectric::{Dielectric, sample_mirror};
+use super::mixture::Mixture;
+use super::parameter::{DiffuseModel, Masking, Params};
+use crate::color::Rgb;
+use crate::math::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
+use crate::math::{Real, V3};
+
+/// The part of a BSDF that a sampled direction was made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Lobe {
+    /// Diffuse reflection, subsurface and sheen.
+    Diffuse,
+    /// The base layer's highlight.
+    Specular,
+    /// The coat's highlight.
+    Clearcoat,
+    /// A perfect mirror.
+    Mirror,
+    /// Reflection by a smooth dielectric.
+    DielectricReflection,
+    /// Refraction by a smooth dielectric.
+    DielectricTransmission,
+}
+
+impl Lobe {
+    /// The lobe holds single directions: its pdf is a discrete probability, and no other sampler can find them.
+    #[inline]
+    pub const fn is_delta(self) -> bool {
+        matches!(self, Self::Mirror | Self::DielectricReflection | Self::DielectricTransmission)
+    }
+}
+
+/// A sampled direction to the light.
+///
+/// `f`·|cos θi|/`pdf` is the weight that the path's throughput is multiplied with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfSample<F = f32> {
+    /// The BSDF without the cosine, of all lobes together. For a delta lobe: the factor of Dirac's delta, over |cos θi|.
+    pub f: Rgb<F>,
+    /// To the light, unit length.
+    pub wi: V3<F>,
+    /// Per unit solid angle, of all lobes together; a discrete probability for a delta lobe. Above 0.
+    pub pdf: F,
+    /// The lobe that the direction was made for.
+    pub lobe: Lobe,
+    /// The refractive index on `wi`'s side over the one on `wo`'s; 1 for reflection.
+    pub eta: F,
+}
+
+/// How a surface scatters light at one point, in the local frame whose z is the shading normal.
+///
+/// Directions are unit vectors that point away from the surface. Only the dielectric scatters below the horizon; all else is black
+/// from behind. Materials that lend the back a surface turn the frame before they ask.
+#[derive(Clone, Copy, Debug)]
+pub struct Bsdf<F = f32> {
+    kind: Kind<F>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Kind<F> {
+    Disney(Mixture<F>),
+    Lambert { base_color: Rgb<F> },
+    Mirror,
+    Dielectric(Dielectric<F>),
+}
+
+impl<F: Real> Bsdf<F> {
+    /// All of Burley 2012. Parameters are taken to be in range; [`super::Parameter::check`] tells.
+    pub fn disney(params: &Params<F>, masking: Masking, diffuse: DiffuseModel) -> Self {
+        Self { kind: Kind::Disney(Mixture::new(params, masking, diffuse)) }
+    }
+
+    /// Lambert's base_color/π.
+    pub fn diffuse(base_color: Rgb<F>) -> Self {
+        Self { kind: Kind::Lambert { base_color } }
+    }
+
+    /// A perfect mirror of reflectance 1.
+    pub fn mirror() -> Self {
+        Self { kind: Kind::Mirror }
+    }
+
+    /// A smooth interface between clear media; `ior` > 0 is the refractive index inside (z < 0) over outside.
+    pub fn dielectric(ior: F) -> Self {
+        Self { kind: Kind::Dielectric(Dielectric { ior }) }
+    }
+
+    /// The BSDF without the cosine. Black unless both directions are above the horizon, and for delta lobes.
+    #[inline]
+    pub fn eval(&self, wo: V3<F>, wi: V3<F>) -> Rgb<F> {
+        self.eval_with_pdf(wo, wi).0
+    }
+
+    /// The density of [`Self::sample`] per unit solid angle of `wi`, 0 for delta lobes.
+    ///
+    /// Its integral is 1 less the samples that come out below the horizon, for which `sample` returns `None`.
+    #[inline]
+    pub fn pdf(&self, wo: V3<F>, wi: V3<F>) -> F {
+        self.eval_with_pdf(wo, wi).1
+    }
+
+    /// The values of [`Self::eval`] and [`Self::pdf`], for less than the two.
+    #[inline]
+    pub fn eval_with_pdf(&self, wo: V3<F>, wi: V3<F>) -> (Rgb<F>, F) {
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.eval_with_pdf(wo, wi),
+            Kind::Lambert { base_color } if wo.z > F::ZERO && wi.z > F::ZERO => {
+                (*base_color * F::FRAC_1_PI, cosine_hemisphere_pdf(wi.z))
+            }
+            Kind::Lambert { .. } | Kind::Mirror | Kind::Dielectric(_) => (Rgb::BLACK, F::ZERO),
+        }
+    }
+
+    /// A direction to the light for a path that comes along `wo`, from numbers in [0, 1): `u_lobe` chooses the lobe and `u` the
+    /// direction within it.
+    ///
+    /// `None` where the path ends: `wo` is below the horizon, or the direction came out below.
+    #[inline]
+    pub fn sample(&self, wo: V3<F>, u_lobe: F, u: [F; 2]) -> Option<BsdfSample<F>> {
+        let (wi, lobe) = match &self.kind {
+            Kind::Disney(mixture) if wo.z > F::ZERO => mixture.sample(wo, u_lobe, u),
+            Kind::Lambert { .. } if wo.z > F::ZERO => (cosine_hemisphere(u), Lobe::Diffuse),
+            Kind::Disney(_) | Kind::Lambert { .. } => return None,
+            Kind::Mirror => return sample_mirror(wo),
+            Kind::Dielectric(dielectric) => return dielectric.sample(wo, u_lobe),
+        };
+        let (f, pdf) = self.eval_with_pdf(wo, wi);
+        (pdf > F::ZERO && pdf.is_finite()).then_some(BsdfSample { f, wi, pdf, lobe, eta: F::ONE })
+    }
+
+    /// Nothing but delta lobes: next-event estimation can't find light here.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        matches!(self.kind, Kind::Mirror | Kind::Dielectric(_))
+    }
+
+    /// What an albedo layer shows: the base colour, or white for mirror and dielectric.
+    #[inline]
+    pub fn albedo(&self) -> Rgb<F> {
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.base_color,
+            Kind::Lambert { base_color } => *base_color,
+            Kind::Mirror | Kind::Dielectric(_) => Rgb::WHITE,
+        }
+    }
+}

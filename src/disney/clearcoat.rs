@@ -1,0 +1,56 @@
+//! The clearcoat: a second, achromatic specular lobe with GTR1's long tail.
+
+use super::microfacet::{Gtr1, smith_isotropic};
+use super::pair::Pair;
+use super::parameter::Params;
+use crate::math::{Real, V3};
+
+/// Alpha of the coat's masking term, whatever the gloss.
+const MASKING_ALPHA: f64 = 0.25;
+/// The coat's reflectance at normal incidence: index 1.5.
+const F0: f64 = 0.04;
+
+/// Reflection by the coat.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clearcoat<F> {
+    /// 0.25·clearcoat.
+    strength: F,
+    distribution: Gtr1<F>,
+}
+
+impl<F: Real> Clearcoat<F> {
+    /// `None` where there is no coat.
+    pub(super) fn new(params: &Params<F>) -> Option<Self> {
+        if params.clearcoat == F::ZERO {
+            return None;
+        }
+        let alpha = F::of(0.1).lerp(F::of(0.001), params.clearcoat_gloss);
+        Some(Self { strength: F::of(0.25) * params.clearcoat, distribution: Gtr1::new(alpha) })
+    }
+
+    /// An estimate of the reflected part of light, from Schlick's weight at `wo`: the value for a narrow peak.
+    #[inline]
+    pub(super) fn albedo(&self, cos_o: F, schlick_o: F) -> F {
+        let masking = smith_isotropic(cos_o, F::of(MASKING_ALPHA)) * cos_o;
+        let fresnel = F::of(F0) + F::of(1.0 - F0) * schlick_o;
+        self.strength * (F::of(4.0) * fresnel * masking.sqr() + F::of(0.01))
+    }
+
+    /// 0.25·clearcoat·G·F·D (Burley 2012, section 5.4, and disney.brdf), the same in all channels, and the density of
+    /// [`Self::sample`] per unit solid angle, D·hz/(4 cos θd).
+    #[inline]
+    pub(super) fn eval_with_pdf(&self, pair: &Pair<F>) -> (F, F) {
+        let d = self.distribution.density(pair);
+        let alpha = F::of(MASKING_ALPHA);
+        let masking = smith_isotropic(pair.wo.z, alpha) * smith_isotropic(pair.wi.z, alpha);
+        let fresnel = F::of(F0) + F::of(1.0 - F0) * pair.schlick;
+        // hz/(4 cos θd) = sum.z/|sum| / (2|sum|).
+        (self.strength * masking * fresnel * d, F::of(0.5) * d * pair.sum.z / pair.sum2)
+    }
+
+    /// `wo` mirrored at a normal of GTR1; may lie below the horizon.
+    #[inline]
+    pub(super) fn sample(&self, wo: V3<F>, u: [F; 2]) -> V3<F> {
+        V3::reflect(wo, self.distribution.sample(u))
+    }
+}

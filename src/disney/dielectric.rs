@@ -1,0 +1,54 @@
+//! Delta lobes: the perfect mirror and the smooth interface between two clear media.
+
+use super::bsdf::{BsdfSample, Lobe};
+use super::fresnel::dielectric_split;
+use crate::color::Rgb;
+use crate::math::{Real, V3};
+
+/// `wo` mirrored about the normal, with all light.
+#[inline]
+pub(super) fn sample_mirror<F: Real>(wo: V3<F>) -> Option<BsdfSample<F>> {
+    if !(wo.z > F::ZERO) {
+        return None;
+    }
+    delta(V3::new(-wo.x, -wo.y, wo.z), F::ONE, F::ONE, Lobe::Mirror, F::ONE)
+}
+
+/// A smooth dielectric.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dielectric<F> {
+    /// The refractive index inside (z < 0) over outside.
+    pub(super) ior: F,
+}
+
+impl<F: Real> Dielectric<F> {
+    /// Reflection with probability F, else refraction by Snell's law.
+    ///
+    /// Transmitted *radiance* changes by 1/eta², since light is squeezed into (or out of) a cone: L/η² is what stays (Veach 1997,
+    /// section 5.2).
+    #[inline]
+    pub(super) fn sample(&self, wo: V3<F>, u_lobe: F) -> Option<BsdfSample<F>> {
+        let cos_o = wo.z.abs();
+        if !(cos_o > F::ZERO) {
+            return None;
+        }
+        let eta = if wo.z > F::ZERO { self.ior } else { F::ONE / self.ior };
+        let split = dielectric_split(cos_o, wo.x.sqr() + wo.y.sqr(), eta);
+        if u_lobe < split.reflectance {
+            let wi = V3::new(-wo.x, -wo.y, wo.z);
+            delta(wi, split.reflectance, split.reflectance, Lobe::DielectricReflection, F::ONE)
+        } else {
+            let wi = V3::new(-wo.x / eta, -wo.y / eta, (-split.cos_t).copysign(-wo.z));
+            let transmittance = F::ONE - split.reflectance;
+            delta(wi, transmittance / eta.sqr(), transmittance, Lobe::DielectricTransmission, eta)
+        }
+    }
+}
+
+/// The sample of a delta lobe that passes on `factor` with probability `pdf`: f is `factor`/|cos θi|. `None` where cos θi is so small that
+/// f is not finite, or where the lobe has probability 0.
+#[inline]
+fn delta<F: Real>(wi: V3<F>, factor: F, pdf: F, lobe: Lobe, eta: F) -> Option<BsdfSample<F>> {
+    let f = factor / wi.z.abs();
+    (pdf > F::ZERO && f.is_finite()).then(|| BsdfSample { f: Rgb::grey(f), wi, pdf, lobe, eta })
+}

@@ -1,0 +1,89 @@
+//! The diffuse lobe: Burley's, Lambert's or glTF's, with the subsurface blend.
+
+use super::fresnel::schlick_weight;
+use super::pair::Pair;
+use super::parameter::{DiffuseModel, Params};
+use crate::color::Rgb;
+use crate::math::Real;
+
+/// The base colour's diffuse reflection, scaled by 1 - metallic.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Diffuse<F> {
+    /// base_color·(1 - metallic)/π.
+    color: Rgb<F>,
+    /// F0 of the specular lobe, for [`DiffuseModel::LambertFresnel`].
+    f0: Rgb<F>,
+    roughness: F,
+    subsurface: F,
+    model: DiffuseModel,
+    /// The reflectance that lobe probabilities are made of, without and with the subsurface blend's weight.
+    cosine_albedo: F,
+    uniform_albedo: F,
+}
+
+impl<F: Real> Diffuse<F> {
+    /// `None` where the lobe reflects nothing.
+    pub(super) fn new(params: &Params<F>, f0: Rgb<F>, model: DiffuseModel) -> Option<Self> {
+        let reflectance = params.base_color * (F::ONE - params.metallic);
+        if reflectance.is_black() {
+            return None;
+        }
+        let mean = reflectance.mean();
+        Some(Self {
+            color: reflectance * F::FRAC_1_PI,
+            f0,
+            roughness: params.roughness,
+            subsurface: params.subsurface,
+            model,
+            cosine_albedo: mean * (F::ONE - F::of(0.5) * params.subsurface),
+            uniform_albedo: mean * F::of(0.5) * params.subsurface,
+        })
+    }
+
+    /// An estimate of the reflected part of light for the cosine sampler and for the uniform one.
+    ///
+    /// The subsurface shape holds 1/(cos θi + cos θo), which cosine sampling would turn into unbounded weights at grazing angles; a
+    /// uniform direction has f·cos/pdf ∝ cos θi/(cos θi + cos θo) ≤ 1. So half of that shape's part is sampled uniformly.
+    #[inline]
+    pub(super) fn albedos(&self) -> (F, F) {
+        (self.cosine_albedo, self.uniform_albedo)
+    }
+
+    /// The BRDF.
+    ///
+    /// Burley 2012, section 5.3, and the subsurface shape of section 5.3's end, inspired by Hanrahan and Krueger. The blend towards it
+    /// holds for all three models: where a Lambert material has a subsurface it is the user's wish.
+    ///
+    /// glTF's model multiplies base_color/π by 1 - F per channel, with the specular lobe's F at this half vector (glTF 2.0, appendix
+    /// B.3.5); where F0 > 1 no diffuse light is left.
+    #[inline]
+    pub(super) fn eval(&self, pair: &Pair<F>) -> Rgb<F> {
+        let mut shape = F::ONE;
+        if self.model == DiffuseModel::Burley || self.subsurface > F::ZERO {
+            let fresnel = [schlick_weight(pair.wi.z), schlick_weight(pair.wo.z)];
+            let retro = pair.cos2_d * self.roughness;
+            if self.model == DiffuseModel::Burley {
+                shape = both_ways(F::of(0.5) + F::of(2.0) * retro, fresnel);
+            }
+            if self.subsurface > F::ZERO {
+                let flat = both_ways(retro, fresnel) * (F::ONE / (pair.wi.z + pair.wo.z) - F::of(0.5));
+                shape = shape.lerp(F::of(1.25) * (flat + F::of(0.5)), self.subsurface);
+            }
+        }
+        let color = self.color * shape;
+        match self.model {
+            DiffuseModel::Burley | DiffuseModel::Lambert => color,
+            DiffuseModel::LambertFresnel => {
+                let left = self.f0.map(|f0| (F::ONE - f0) * (F::ONE - pair.schlick));
+                color * left.map(|f| f.max(F::ZERO))
+            }
+        }
+    }
+}
+
+/// lerp(1, f90, FL)·lerp(1, f90, FV).
+#[inline]
+fn both_ways<F: Real>(f90: F, [fl, fv]: [F; 2]) -> F {
+    let rise = f90 - F::ONE;
+    (F::ONE + rise * fl) * (F::ONE + rise * fv)
+}

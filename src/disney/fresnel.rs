@@ -1,0 +1,77 @@
+//! Fresnel reflectance: Schlick's approximation and the exact one of a dielectric.
+
+use crate::math::Real;
+
+/// Schlick's weight (1 - cos θ)⁵: reflectance is lerp(F0, 1, weight). Schlick 1994, eq. 15.
+#[inline]
+pub fn schlick_weight<F: Real>(cos_theta: F) -> F {
+    (F::ONE - cos_theta).clamp(F::ZERO, F::ONE).pow5()
+}
+
+/// How a smooth dielectric splits light that meets it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct DielectricSplit<F> {
+    /// The reflected part in [0, 1], for unpolarised light.
+    pub(super) reflectance: F,
+    /// The cosine of the refracted angle, 0 where all light is reflected.
+    pub(super) cos_t: F,
+}
+
+/// The split at an interface whose far side has `eta` times the near side's refractive index.
+///
+/// Takes cosine and squared sine of the incident angle, both, since neither follows from the other without loss.
+#[inline]
+pub(super) fn dielectric_split<F: Real>(cos_i: F, sin2_i: F, eta: F) -> DielectricSplit<F> {
+    let cos2_t = F::ONE - sin2_i / eta.sqr();
+    if cos2_t <= F::ZERO {
+        return DielectricSplit { reflectance: F::ONE, cos_t: F::ZERO };
+    }
+    let cos_t = cos2_t.sqrt();
+    let r_parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    let r_perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    let reflectance = F::of(0.5) * (r_parallel.sqr() + r_perpendicular.sqr());
+    DielectricSplit { reflectance: reflectance.min(F::ONE), cos_t }
+}
+
+/// The reflectance of a smooth dielectric for unpolarised light (Fresnel's equations), 1 under total internal reflection.
+///
+/// `cos_i` in [0, 1] is measured from the normal on light's side; `eta` > 0 is the far side's refractive index over the near side's.
+#[inline]
+pub fn fresnel_dielectric<F: Real>(cos_i: F, eta: F) -> F {
+    let sin2_i = ((F::ONE - cos_i) * (F::ONE + cos_i)).max(F::ZERO);
+    dielectric_split(cos_i, sin2_i, eta).reflectance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glass_reflects_four_percent_head_on_and_everything_at_grazing() {
+        assert!((fresnel_dielectric(1.0f64, 1.5) - 0.04).abs() < 1e-15);
+        assert!(fresnel_dielectric(1e-9f64, 1.5) > 0.999_999);
+    }
+
+    #[test]
+    fn light_from_inside_is_totally_reflected_beyond_the_critical_angle() {
+        // sin θc = 1/1.5, cos θc = 0.745356.
+        assert_eq!(fresnel_dielectric(0.745f64, 1.0 / 1.5), 1.0);
+        assert!(fresnel_dielectric(0.746f64, 1.0 / 1.5) < 1.0);
+    }
+
+    #[test]
+    fn p_polarised_light_is_not_reflected_at_brewsters_angle() {
+        let eta = 1.5f64;
+        let cos_i = 1.0 / (1.0 + eta * eta).sqrt();
+        // Only the s-polarised half remains: ½((1 - η²)/(1 + η²))².
+        let expected = 0.5 * ((1.0 - eta * eta) / (1.0 + eta * eta)).sqr();
+        assert!((fresnel_dielectric(cos_i, eta) - expected).abs() < 1e-15);
+    }
+
+    #[test]
+    fn equal_media_reflect_nothing() {
+        for cos_i in [1.0f32, 0.5, 1e-3] {
+            assert!(fresnel_dielectric(cos_i, 1.0) < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! What the lobes need to know of a pair of directions, computed once.
+
+use crate::math::{Real, V3};
+
+/// Two directions above the surface with the terms all lobes share.
+///
+/// Terms are symmetric in the two directions as far as both have unit length: in `f32` reciprocity holds to about
+/// 10⁻⁶/|wo + wi|.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pair<F> {
+    /// To the viewer.
+    pub(super) wo: V3<F>,
+    /// To the light.
+    pub(super) wi: V3<F>,
+    /// wo + wi: the half vector times 2 cos θd, not normalised.
+    pub(super) sum: V3<F>,
+    /// |wo + wi|² = 4 cos² θd.
+    pub(super) sum2: F,
+    /// cos² θd, θd being the angle between either direction and the half vector.
+    pub(super) cos2_d: F,
+    /// Schlick's weight (1 - cos θd)⁵.
+    pub(super) schlick: F,
+}
+
+impl<F: Real> Pair<F> {
+    /// `None` unless both directions are above the horizon. Also where they are opposite to within rounding, 10⁻¹⁵ above the
+    /// horizon both: there is no half vector.
+    #[inline]
+    pub(super) fn new(wo: V3<F>, wi: V3<F>) -> Option<Self> {
+        if !(wo.z > F::ZERO && wi.z > F::ZERO) {
+            return None;
+        }
+        let sum = wo + wi;
+        let sum2 = sum.length_squared();
+        // Written so that NaN goes the same way.
+        if !(sum2 > F::of(1e-30) && sum2 < F::of(5.0)) {
+            return None;
+        }
+        // Not |wo + wi|/2, which is the same for exact unit vectors alone.
+        let cos_d = wi.dot(sum) / sum2.sqrt();
+        let one_minus_cos_d = if cos_d > F::of(0.5) {
+            // = sin² θd/(1 + cos θd) with sin θd = |wo - wi|/2: no cancellation near θd = 0.
+            F::of(0.25) * (wo - wi).length_squared() / (F::ONE + cos_d)
+        } else {
+            F::ONE - cos_d.max(F::ZERO)
+        };
+        Some(Self { wo, wi, sum, sum2, cos2_d: cos_d.sqr(), schlick: one_minus_cos_d.pow5() })
+    }
+}

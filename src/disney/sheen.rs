@@ -1,0 +1,34 @@
+//! Sheen: a grazing component for cloth.
+
+use super::pair::Pair;
+use super::parameter::Params;
+use crate::color::Rgb;
+use crate::math::Real;
+
+/// The sheen term. It is broad, and sampled by the cosine together with the diffuse lobe.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sheen<F> {
+    color: Rgb<F>,
+    mean: F,
+}
+
+impl<F: Real> Sheen<F> {
+    /// `None` where the term is zero. `tint` is the base colour's hue.
+    pub(super) fn new(params: &Params<F>, tint: Rgb<F>) -> Option<Self> {
+        let strength = params.sheen * (F::ONE - params.metallic);
+        let color = Rgb::WHITE.lerp(tint, params.sheen_tint) * strength;
+        (!color.is_black()).then(|| Self { color, mean: color.mean() })
+    }
+
+    /// An estimate of the reflected part of light, from Schlick's weight at `wo`.
+    #[inline]
+    pub(super) fn albedo(&self, schlick_o: F) -> F {
+        self.mean * (F::of(0.002) + F::of(0.12) * schlick_o)
+    }
+
+    /// sheen·lerp(1, tint, sheen_tint)·(1 - metallic)·(1 - cos θd)⁵, without a 1/π (Burley 2012, section 5.5, and disney.brdf).
+    #[inline]
+    pub(super) fn eval(&self, pair: &Pair<F>) -> Rgb<F> {
+        self.color * pair.schlick
+    }
+}

@@ -1,0 +1,95 @@
+//! The Disney BRDF against golden values: those of a reference evaluation, named by the environment, and a set of our own.
+
+use std::path::Path;
+
+use pipeline::color::Rgb;
+use pipeline::disney::{Bsdf, DiffuseModel, Masking, Params};
+use pipeline::math::V3;
+
+/// A row's columns by name.
+struct Row<'a> {
+    header: &'a [&'a str],
+    values: Vec<&'a str>,
+}
+
+impl Row<'_> {
+    fn text(&self, name: &str) -> &str {
+        let column = self.header.iter().position(|h| *h == name);
+        self.values[column.unwrap_or_else(|| panic!("there is no column {name}"))]
+    }
+
+    fn f32(&self, name: &str) -> f32 {
+        self.text(name).parse().unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    fn params(&self) -> Params {
+        Params {
+            base_color: Rgb::new(
+                self.f32("base_color_r"),
+                self.f32("base_color_g"),
+                self.f32("base_color_b"),
+            ),
+            subsurface: self.f32("subsurface"),
+            metallic: self.f32("metallic"),
+            specular: self.f32("specular"),
+            specular_tint: self.f32("specular_tint"),
+            roughness: self.f32("roughness"),
+            anisotropic: self.f32("anisotropic"),
+            sheen: self.f32("sheen"),
+            sheen_tint: self.f32("sheen_tint"),
+            clearcoat: self.f32("clearcoat"),
+            clearcoat_gloss: self.f32("clearcoat_gloss"),
+        }
+    }
+
+    fn direction(&self, name: &str) -> V3<f32> {
+        let [x, y, z] = ["x", "y", "z"].map(|axis| self.f32(&format!("{name}{axis}")));
+        V3::new(x, y, z)
+    }
+}
+
+/// Calls `check` with every row of a CSV file; returns how many there were.
+fn for_each_row(path: &Path, mut check: impl FnMut(Row)) -> usize {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let mut rows = 0;
+    for line in lines {
+        check(Row { header: &header, values: line.split(',').collect() });
+        rows += 1;
+    }
+    rows
+}
+
+/// The largest relative error of a channel. One at the ends of the exponent range can't pass as 0/0.
+fn relative_error(row: &Row, masking: Masking, diffuse: DiffuseModel) -> f64 {
+    let bsdf = Bsdf::disney(&row.params(), masking, diffuse);
+    let f = bsdf.eval(row.direction("v"), row.direction("l"));
+    let expected = ["fr", "fg", "fb"].map(|c| row.text(c).parse::<f64>().unwrap());
+    let mut worst: f64 = 0.0;
+    for (is, should) in f.to_array().into_iter().zip(expected) {
+        assert!(is.is_finite() && should > 0.0);
+        worst = worst.max((f64::from(is) - should).abs() / should);
+    }
+    worst
+}
+
+#[test]
+fn reference_rows_hold_to_a_relative_1e_4() {
+    let Some(folder) = std::env::var_os("PIPELINE_ORACLE") else {
+        eprintln!("skipped: PIPELINE_ORACLE names no folder with reference rows");
+        return;
+    };
+    let files =
+        [("disney_brdf.csv", Masking::Matched, 4000), ("disney_brdf_2012_g.csv", Masking::Remapped, 1500)];
+    for (name, masking, expected_rows) in files {
+        let mut worst: f64 = 0.0;
+        let rows = for_each_row(&Path::new(&folder).join(name), |row| {
+            let error = relative_error(&row, masking, DiffuseModel::Burley);
+            worst = worst.max(error);
+            assert!(error < 1e-4, "{name}: {error:e} at {:?}", row.values);
+        });
+        assert_eq!(rows, expected_rows, "{name}");
+        eprintln!("{name}: {rows} rows, largest relative error {worst:.2e}");
+    }
+}
