@@ -19,12 +19,14 @@ pub struct Ray {
     pub direction: Vec3,
     /// Where it ends.
     pub t_max: f32,
+    /// The triangle it starts on, which being flat it can't meet again: rounding must not say otherwise.
+    pub source: Option<u32>,
 }
 
 impl Ray {
     /// A ray without end.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction, t_max: f32::INFINITY }
+        Self { origin, direction, t_max: f32::INFINITY, source: None }
     }
 }
 
@@ -112,7 +114,9 @@ impl Bvh {
         let sheared = ShearedRay::new(&ray);
         self.traverse(&mut ray, |ray, first, count| {
             for i in first..first + count {
-                if let Some((t, barycentric)) = self.triangles[i].intersect(&sheared, ray.t_max) {
+                if let Some((t, barycentric)) = self.triangles[i].intersect(&sheared, ray.t_max)
+                    && ray.source != Some(self.ids[i])
+                {
                     ray.t_max = t;
                     nearest = Some(Hit { t, triangle: self.ids[i], barycentric });
                 }
@@ -133,7 +137,9 @@ impl Bvh {
         let sheared = ShearedRay::new(&ray);
         self.traverse(&mut ray, |ray, first, count| {
             for i in first..first + count {
-                if let Some((t, barycentric)) = self.triangles[i].intersect(&sheared, ray.t_max) {
+                if let Some((t, barycentric)) = self.triangles[i].intersect(&sheared, ray.t_max)
+                    && ray.source != Some(self.ids[i])
+                {
                     visitor(Hit { t, triangle: self.ids[i], barycentric })?;
                 }
             }

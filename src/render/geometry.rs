@@ -17,8 +17,7 @@ pub struct Geometry {
     /// The instance and the triangle's index in its mesh.
     origins: Vec<(u32, u32)>,
     instances: Vec<PlacedMesh>,
-    /// Centre and radius (at least a tiny one) of a sphere around everything.
-    pub(super) center: Vec3,
+    /// The radius, at least a tiny one, of a sphere around everything.
     pub(super) radius: f32,
 }
 
@@ -72,7 +71,6 @@ impl Geometry {
             vertices,
             origins,
             instances,
-            center,
             radius: (high - center).length().max(f32::MIN_POSITIVE),
         })
     }
@@ -122,14 +120,17 @@ impl Geometry {
 }
 
 impl TrianglePoint<'_> {
-    /// The world position, and how far rounding may have moved it per axis: γ(7)·Σ|bᵢpᵢ| (Pharr, Jakob and Humphreys,
-    /// "Physically Based Rendering", 4th ed., section 6.8.4).
+    /// The world position, and how far from the plane of its triangle rounding may put it, or make a ray meet the plane of a
+    /// neighbour: some ulps of the position itself, and of the corners' distance from it, which is all that the intersection
+    /// test computes with.
     #[inline]
-    pub(super) fn position(&self) -> (Vec3, Vec3) {
-        const GAMMA_7: f32 = 7.0 * (f32::EPSILON * 0.5) / (1.0 - 7.0 * (f32::EPSILON * 0.5));
-        let parts = [0, 1, 2].map(|i| self.world[i] * self.barycentric[i]);
-        let error = parts[0].abs() + parts[1].abs() + parts[2].abs();
-        (parts[0] + parts[1] + parts[2], error * GAMMA_7)
+    pub(super) fn position(&self) -> (Vec3, f32) {
+        const UNIT: f32 = f32::EPSILON * 0.5;
+        let [a, b, c] = self.world;
+        let (e1, e2) = (b - a, c - a);
+        let point = a + (e1 * self.barycentric[1] + e2 * self.barycentric[2]);
+        let extent = e1.abs().max(e2.abs()).max_element();
+        (point, 3.0 * UNIT * point.abs().max_element() + 16.0 * UNIT * extent)
     }
 
     /// The unit geometric normal of the front side.

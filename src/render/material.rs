@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::geometry::TrianglePoint;
 use crate::color::Rgb;
 use crate::disney::{Bsdf, Model, Parameter, Params};
-use crate::math::{Frame, Real};
+use crate::math::Frame;
 use crate::scene::material::{Material, NormalMap, Param, ShadingFrame, Sides, TextureChannel, TextureMap};
 use crate::scene::{Scene, texture::Texel};
 
@@ -116,7 +116,9 @@ impl PreparedMaterial {
         match &self.emission {
             Emitting::Nothing => Rgb::BLACK,
             Emitting::Constant(radiance, sides) if leaves(*sides) => *radiance,
-            Emitting::Varying(color, strength, sides) if leaves(*sides) => read_color(scene, color, at) * *strength,
+            Emitting::Varying(color, strength, sides) if leaves(*sides) => {
+                read_color(scene, color, at) * *strength
+            }
             Emitting::Constant(..) | Emitting::Varying(..) => Rgb::BLACK,
         }
     }
@@ -190,11 +192,8 @@ impl PreparedMaterial {
         let front = normal * side;
         let frame = Frame::from_normal_and_tangent(front, tangent);
         let texel = read_texel(scene, &map.map, at).color;
-        let (x, y, z) = (
-            (2.0 * texel.r - 1.0) * map.scale,
-            (2.0 * texel.g - 1.0) * map.scale,
-            2.0 * texel.b - 1.0,
-        );
+        let (x, y, z) =
+            ((2.0 * texel.r - 1.0) * map.scale, (2.0 * texel.g - 1.0) * map.scale, 2.0 * texel.b - 1.0);
         let mapped = frame.tangent * x + frame.bitangent * (y * sign) + front * z;
         mapped.try_normalize().map_or(normal, |n| n * side)
     }

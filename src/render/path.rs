@@ -1,0 +1,253 @@
+//! The path tracer: next-event estimation and BSDF sampling, combined by multiple importance sampling.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+
+use super::Prepared;
+use super::surface::{Shading, Surface, offset};
+use crate::accel::Ray;
+use crate::color::Rgb;
+use crate::light::{LightPlace, LightSample};
+use crate::math::sobol::{Purpose, Sampler};
+
+/// What one camera path found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PathSample {
+    pub(super) radiance: Rgb,
+    /// At the first surface: albedo, world normal turned to the viewer, and depth along the viewing axis.
+    pub(super) first: Option<FirstHit>,
+    pub(super) rays: u64,
+}
+
+/// What the first surface of a path looks like.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FirstHit {
+    pub(super) albedo: Rgb,
+    pub(super) normal: Vec3,
+    pub(super) depth: f32,
+}
+
+/// Where a path last scattered, for weighing what its ray finds against light sampling. None stands for places that light
+/// sampling can't reach: the camera and specular surfaces.
+#[derive(Clone, Copy)]
+struct LastScatter {
+    point: Vec3,
+    pdf: f32,
+}
+
+/// Roulette begins after so many vertices.
+const ROULETTE_START: u32 = 4;
+/// And lets no more than this survive, so that a path through lossless surfaces ends.
+const MAX_SURVIVAL: f32 = 0.95;
+
+/// The power heuristic (Veach 1997) with exponent 2, safe from overflow.
+#[inline]
+fn power_heuristic(pdf: f32, other: f32) -> f32 {
+    if !pdf.is_finite() {
+        return 1.0;
+    }
+    let ratio = other / pdf;
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Traces one path. `inspect` is called at each vertex with the radiance gathered so far.
+#[inline]
+pub(super) fn trace(
+    scene: &Prepared,
+    sampler: &Sampler,
+    camera_ray: Ray,
+    mut inspect: impl FnMut(ReplayVertex),
+) -> PathSample {
+    let mut path = PathSample::default();
+    let mut ray = camera_ray;
+    let mut beta = Rgb::WHITE;
+    let mut last_scatter: Option<LastScatter> = None;
+    // Radiance grows by eta² on entering glass and shrinks again on leaving: roulette must not see that.
+    let mut eta_scale = 1.0f32;
+    let mut scatterings = 0;
+
+    for vertex in 1.. {
+        // Find the next surface, or leave the scene.
+        path.rays += 1;
+        let Some(hit) = scene.geometry.bvh.closest(&ray) else {
+            if let Some((radiance, pdf_light)) = scene.lights.environment(ray.direction) {
+                let w_bsdf = last_scatter.map_or(1.0, |s| power_heuristic(s.pdf, pdf_light));
+                path.radiance += beta * radiance * w_bsdf;
+            }
+            break;
+        };
+        let surface = Surface::new(scene, &ray, &hit);
+
+        // A partly transparent surface lets its share of paths pass straight on.
+        let alpha = surface.material.alpha(&scene.scene, &surface.at);
+        if alpha < 1.0 && sampler.set(vertex, Purpose::Opacity)[0] >= alpha {
+            ray = surface.leave(ray.direction);
+            continue;
+        }
+
+        // Add what the surface sends out by itself.
+        let emitted = surface.emitted(scene);
+        if !emitted.is_black() {
+            let w_bsdf = last_scatter.map_or(1.0, |s| {
+                let distance = (surface.point - s.point).length();
+                let pdf_light = scene.lights.pdf_triangle(surface.triangle, ray.direction, distance);
+                power_heuristic(s.pdf, pdf_light)
+            });
+            path.radiance += beta * emitted * w_bsdf;
+        }
+
+        // Work out how it scatters.
+        let shading = surface.shading(scene);
+        if path.first.is_none() {
+            path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
+        }
+        inspect(ReplayVertex { point: surface.point.into(), radiance: path.radiance, beta });
+        let Some(shading) = shading else { break };
+        if scatterings == scene.settings.max_depth {
+            break;
+        }
+
+        // Sample a light, unless no light could be reflected from it.
+        if !shading.bsdf.is_delta() && !scene.lights.is_empty() {
+            let [u_light, u0, u1, _] = sampler.set(vertex, Purpose::Light);
+            if let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) {
+                path.radiance += beta * direct_light(scene, &surface, &shading, &sample, &mut path.rays);
+            }
+        }
+
+        // Sample the BSDF for the next direction.
+        let [u_lobe, u0, u1, u_roulette] = sampler.set(vertex, Purpose::Bsdf);
+        let Some(sample) = shading.bsdf.sample(shading.wo, u_lobe, [u0, u1]) else { break };
+        let wi = shading.frame.world_from_local(sample.wi).normalize();
+        let transmits = sample.wi.z * shading.wo.z < 0.0;
+        if surface.same_side(wi) == transmits {
+            break;
+        }
+        beta *= sample.f * (sample.wi.z.abs() / sample.pdf);
+        if beta.is_black() {
+            break;
+        }
+        eta_scale *= sample.eta * sample.eta;
+        scatterings += 1;
+        last_scatter =
+            (!sample.lobe.is_delta()).then_some(LastScatter { point: surface.point, pdf: sample.pdf });
+        ray = surface.leave(wi);
+
+        // End paths that carry little, and let survivors stand for them.
+        if scatterings > ROULETTE_START {
+            let survival = (beta.max_channel() * eta_scale).min(MAX_SURVIVAL);
+            if u_roulette >= survival {
+                break;
+            }
+            beta = beta / survival;
+        }
+    }
+    path
+}
+
+/// What arrives from a light sample and is reflected to the viewer, weighed against BSDF sampling.
+#[inline]
+fn direct_light(
+    scene: &Prepared,
+    surface: &Surface<'_>,
+    shading: &Shading,
+    sample: &LightSample,
+    rays: &mut u64,
+) -> Rgb {
+    if !surface.same_side(sample.wi) {
+        return Rgb::BLACK;
+    }
+    let wi = shading.frame.local_from_world(sample.wi);
+    let (f, pdf_bsdf) = shading.bsdf.eval_with_pdf(shading.wo, wi);
+    if f.is_black() {
+        return Rgb::BLACK;
+    }
+    let (arriving, w_light, shadow) = match sample.place {
+        LightPlace::Surface { triangle, barycentric } => {
+            let light = scene.geometry.point_on(triangle, barycentric);
+            let normal = light.geometric_normal();
+            let material = scene.material_of(triangle);
+            let coverage = material.alpha(&scene.scene, &light);
+            let radiance = material.emitted(&scene.scene, &light, normal.dot(sample.wi) < 0.0) * coverage;
+            let (point, error) = light.position();
+            let target = offset(point, error, normal, -sample.wi);
+            (radiance, power_heuristic(sample.pdf, pdf_bsdf), surface.reach(sample.wi, target))
+        }
+        LightPlace::Point { position, radiance } => (radiance, 1.0, surface.reach(sample.wi, position)),
+        LightPlace::Far { radiance, is_delta } => {
+            let w_light = if is_delta { 1.0 } else { power_heuristic(sample.pdf, pdf_bsdf) };
+            (radiance, w_light, surface.leave(sample.wi))
+        }
+    };
+    if arriving.is_black() {
+        return Rgb::BLACK;
+    }
+    *rays += 1;
+    f * arriving * (wi.z.abs() * w_light / sample.pdf * transmittance(scene, &shadow))
+}
+
+/// The fraction of light that passes a segment: the product of what each surface on it lets through.
+#[inline]
+fn transmittance(scene: &Prepared, shadow: &Ray) -> f32 {
+    if scene.all_opaque {
+        return if scene.geometry.bvh.occluded(shadow) { 0.0 } else { 1.0 };
+    }
+    let mut passing = 1.0;
+    let blocked = scene.geometry.bvh.visit(shadow, |hit| {
+        let material = scene.material_of(hit.triangle);
+        passing *= 1.0 - material.alpha(&scene.scene, &scene.geometry.at(&hit));
+        if passing > 0.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    if blocked { 0.0 } else { passing }
+}
+
+fn first_hit(scene: &Prepared, ray: &Ray, surface: &Surface<'_>, shading: Option<&Shading>) -> FirstHit {
+    FirstHit {
+        albedo: shading.map_or(Rgb::BLACK, |s| s.bsdf.albedo()),
+        normal: shading.map_or(Vec3::ZERO, |s| if s.wo.z < 0.0 { -s.frame.normal } else { s.frame.normal }),
+        depth: (surface.point - ray.origin).dot(scene.camera.axis),
+    }
+}
+
+/// One vertex of a replayed path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReplayVertex {
+    /// World position.
+    pub point: [f32; 3],
+    /// The radiance gathered up to here, this surface's emission included.
+    pub radiance: Rgb,
+    /// The throughput with which the path arrived.
+    pub beta: Rgb,
+}
+
+/// A path told vertex by vertex.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replay {
+    /// The sample's radiance, as it is: not finite if the sample is bad.
+    pub radiance: Rgb,
+    /// Where the path went.
+    pub vertices: Vec<ReplayVertex>,
+}
+
+/// Traces sample `sample` of pixel (x, y) again and tells where it went.
+pub fn replay(scene: &Prepared, x: u32, y: u32, sample: u32) -> Replay {
+    let mut vertices = Vec::new();
+    let path = super::film::sample_pixel(scene, x, y, sample, |v| vertices.push(v));
+    Replay { radiance: path.radiance, vertices }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_of_two_strategies_sum_to_one() {
+        for (a, b) in [(1.0, 2.0), (1e30, 1e-30), (1e-38, 1e38), (5.0, 0.0)] {
+            let sum = power_heuristic(a, b) + power_heuristic(b, a);
+            // A strategy that can't make the sample has no say.
+            assert!((sum - 1.0).abs() < 1e-6 || b == 0.0, "{a} {b}: {sum}");
+            assert!(power_heuristic(a, b).is_finite());
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! What a job needs beyond geometry: materials, lights, camera, and what the scene lets us skip.
+
+use std::sync::Arc;
+
+use super::RenderError;
+use super::camera::FilmCamera;
+use super::filter::FilterSampler;
+use super::geometry::Geometry;
+use super::material::PreparedMaterial;
+use crate::light::{EmissiveTriangle, EnvironmentLight, Lights};
+use crate::scene::environment::EnvironmentMap;
+use crate::scene::{Camera, Named, Scene};
+use crate::settings::RenderSettings;
+
+/// The size of images where neither settings nor camera say one.
+const DEFAULT_SIZE: (u32, u32) = (640, 480);
+
+/// A scene ready to be rendered with given settings.
+#[derive(Debug)]
+pub struct Prepared {
+    pub(super) scene: Arc<Scene>,
+    pub(super) geometry: Arc<Geometry>,
+    materials: Vec<PreparedMaterial>,
+    pub(super) lights: Lights,
+    pub(super) camera: FilmCamera,
+    pub(super) filter: FilterSampler,
+    pub(super) settings: RenderSettings,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// No surface lets light pass, so that a shadow ray needs no look at materials.
+    pub(super) all_opaque: bool,
+}
+
+impl Prepared {
+    /// Prepares `scene`, whose triangles `geometry` holds.
+    ///
+    /// # Errors
+    /// [`RenderError`] for settings out of range and missing or unusable cameras.
+    pub fn new(
+        scene: Arc<Scene>,
+        geometry: Arc<Geometry>,
+        settings: &RenderSettings,
+    ) -> Result<Self, RenderError> {
+        let camera = choose_camera(&scene, settings)?;
+        let (width, height) = image_size(&camera.item, settings);
+        check(settings, width, height)?;
+        let film_camera = FilmCamera::new(&camera.name, &camera.item, width, height)?;
+        let materials: Vec<_> = scene.materials.iter().map(|m| PreparedMaterial::new(&m.item)).collect();
+        let lights = collect_lights(&scene, &geometry, &materials);
+        let all_opaque = scene.instances.iter().all(|i| materials[i.material.0 as usize].is_opaque());
+        Ok(Self {
+            camera: film_camera,
+            filter: FilterSampler::new(settings.filter, settings.filter_radius),
+            settings: settings.clone(),
+            materials,
+            lights,
+            width,
+            height,
+            all_opaque,
+            scene,
+            geometry,
+        })
+    }
+
+    /// Columns and rows of the image.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// What this scene lets the renderer leave out, in words.
+    pub fn skipped(&self) -> Vec<String> {
+        let [areas, punctual, environments] = self.lights.counts();
+        let constant = self.materials.iter().filter(|m| m.is_constant()).count();
+        let mut skipped = Vec::new();
+        if constant > 0 {
+            skipped.push(format!(
+                "parameters worked out once for {constant} of {} materials",
+                self.materials.len()
+            ));
+        }
+        if self.all_opaque {
+            skipped.push("opacity: every surface is opaque".to_owned());
+        }
+        for (count, what) in
+            [(areas, "area lights"), (punctual, "punctual lights"), (environments, "environment")]
+        {
+            if count == 0 {
+                skipped.push(format!("{what}: none"));
+            }
+        }
+        skipped
+    }
+
+    #[inline]
+    pub(super) fn material_of(&self, triangle: u32) -> &PreparedMaterial {
+        let instance = &self.scene.instances[self.geometry.instance_of(triangle)];
+        &self.materials[instance.material.0 as usize]
+    }
+}
+
+fn choose_camera<'a>(scene: &'a Scene, settings: &RenderSettings) -> Result<&'a Named<Camera>, RenderError> {
+    match &settings.camera {
+        None => scene.cameras.first().ok_or(RenderError::NoCamera),
+        Some(name) => {
+            scene.cameras.iter().find(|c| c.name == *name).ok_or_else(|| RenderError::UnknownCamera {
+                name: name.clone(),
+                known: scene.cameras.iter().map(|c| c.name.clone()).collect(),
+            })
+        }
+    }
+}
+
+/// The settings decide; a size that is missing comes from the camera, keeping its aspect.
+fn image_size(camera: &Camera, settings: &RenderSettings) -> (u32, u32) {
+    let (default_width, default_height) = camera.size.unwrap_or(DEFAULT_SIZE);
+    let aspect = match (camera.size, camera.aspect) {
+        (None, Some(aspect)) if aspect.is_finite() && aspect > 0.0 => f64::from(aspect),
+        _ => f64::from(default_width) / f64::from(default_height),
+    };
+    let round = |x: f64| x.round().clamp(1.0, f64::from(u32::MAX)) as u32;
+    match (settings.width, settings.height) {
+        (Some(width), Some(height)) => (width, height),
+        (Some(width), None) => (width, round(f64::from(width) / aspect)),
+        (None, height) => {
+            let height = height.unwrap_or(default_height);
+            (round(f64::from(height) * aspect), height)
+        }
+    }
+}
+
+fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), RenderError> {
+    let positive = |setting, value: u32, max: u32, expected| {
+        if (1..=max).contains(&value) {
+            Ok(())
+        } else {
+            Err(RenderError::Setting { setting, value: value.to_string(), expected })
+        }
+    };
+    positive("width", width, 65_536, "between 1 and 65536")?;
+    positive("height", height, 65_536, "between 1 and 65536")?;
+    positive("spp", settings.spp, 1 << 24, "between 1 and 16777216")?;
+    positive("replicates", settings.replicates, 64, "between 1 and 64")?;
+    positive("max_depth", settings.max_depth.saturating_add(1), 65_536, "between 0 and 65535")?;
+    if u64::from(width) * u64::from(height) > 1 << 28 {
+        let value = format!("{width} × {height}");
+        return Err(RenderError::Setting {
+            setting: "width × height",
+            value,
+            expected: "at most 2^28 pixels",
+        });
+    }
+    match settings.filter_radius {
+        Some(radius) if !(0.1..=8.0).contains(&radius) => Err(RenderError::Setting {
+            setting: "filter_radius",
+            value: radius.to_string(),
+            expected: "between 0.1 and 8 pixels",
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn collect_lights(scene: &Scene, geometry: &Geometry, materials: &[PreparedMaterial]) -> Lights {
+    let emission: Vec<_> = materials.iter().map(|m| m.mean_emission(scene)).collect();
+    let triangles: Vec<EmissiveTriangle> = geometry
+        .materials(scene)
+        .filter_map(|(triangle, material)| {
+            let (mean_radiance, sides) = emission[material.0 as usize]?;
+            Some(EmissiveTriangle {
+                triangle,
+                vertices: geometry.front_facing(triangle),
+                mean_radiance,
+                sides,
+            })
+        })
+        .collect();
+    let punctual: Vec<_> = scene.lights.iter().map(|l| l.item).collect();
+    let environment = scene.environment.as_ref().map(|e| {
+        let image = match e.map {
+            EnvironmentMap::Image { image, .. } => Some(&scene.images[image.0 as usize]),
+            EnvironmentMap::Constant => None,
+        };
+        EnvironmentLight::new(e, image)
+    });
+    Lights::new(&triangles, &punctual, environment, geometry.radius)
+}

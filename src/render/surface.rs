@@ -1,0 +1,136 @@
+//! A point where a path meets a surface: position, normals, shading frame and BSDF.
+
+use glam::Vec3;
+
+use super::Prepared;
+use super::geometry::TrianglePoint;
+use super::material::PreparedMaterial;
+use crate::accel::{Hit, Ray};
+use crate::color::Rgb;
+use crate::disney::Bsdf;
+use crate::math::{Frame, V3};
+
+/// A hit with what is known before shading.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surface<'a> {
+    pub(super) at: TrianglePoint<'a>,
+    pub(super) material: &'a PreparedMaterial,
+    pub(super) triangle: u32,
+    pub(super) point: Vec3,
+    /// How far `point` must be moved off the surface for a ray to leave it.
+    error: f32,
+    /// The geometric normal of the front side.
+    normal: Vec3,
+    /// Unit direction to where the path came from.
+    pub(super) wo: Vec3,
+    pub(super) is_front: bool,
+}
+
+/// The local frame of a surface with its BSDF.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shading {
+    pub(super) frame: Frame,
+    pub(super) bsdf: Bsdf,
+    /// The viewer in the frame.
+    pub(super) wo: V3<f32>,
+}
+
+impl<'a> Surface<'a> {
+    /// What `ray` (of unit direction) hit.
+    #[inline]
+    pub(super) fn new(scene: &'a Prepared, ray: &Ray, hit: &Hit) -> Self {
+        let at = scene.geometry.at(hit);
+        let (point, error) = at.position();
+        let normal = at.geometric_normal();
+        let wo = -ray.direction;
+        let material = scene.material_of(hit.triangle);
+        Self {
+            at,
+            material,
+            triangle: hit.triangle,
+            point,
+            error,
+            normal,
+            wo,
+            is_front: wo.dot(normal) >= 0.0,
+        }
+    }
+
+    /// The radiance that leaves towards the viewer.
+    #[inline]
+    pub(super) fn emitted(&self, scene: &Prepared) -> Rgb {
+        self.material.emitted(&scene.scene, &self.at, self.is_front)
+    }
+
+    /// Frame and BSDF; none where the surface scatters nothing towards the viewer.
+    ///
+    /// The shading normal is turned to the viewer's geometric side, except for interfaces, whose inside is a place of its own.
+    /// Where it still looks away from the viewer, at silhouettes of smooth meshes, one-sided materials are black, as in Aris;
+    /// others fall back to the geometric normal.
+    #[inline]
+    pub(super) fn shading(&self, scene: &Prepared) -> Option<Shading> {
+        let one_sided = self.material.sides == crate::scene::material::Sides::Front;
+        let is_interface = self.material.is_interface;
+        if one_sided && !self.is_front && !is_interface {
+            return None;
+        }
+        let side = if self.is_front || is_interface { 1.0 } else { -1.0 };
+        let faces_viewer = |n: Vec3| (self.wo.dot(n) > 0.0) == (self.is_front || !is_interface);
+        let mut frame = self.frame_around(scene, self.at.shading_normal(self.normal) * side);
+        if !faces_viewer(frame.normal) {
+            if one_sided && !is_interface {
+                return None;
+            }
+            frame = Frame::from_normal(self.normal * side);
+        }
+        let wo = frame.local_from_world(self.wo);
+        Some(Shading { frame, bsdf: self.material.bsdf(&scene.scene, &self.at), wo })
+    }
+
+    fn frame_around(&self, scene: &Prepared, normal: Vec3) -> Frame {
+        self.material.frame(&scene.scene, &self.at, normal, self.is_front || self.material.is_interface)
+    }
+
+    /// Whether `wi` leaves on the viewer's side of the geometric surface.
+    #[inline]
+    pub(super) fn same_side(&self, wi: Vec3) -> bool {
+        (wi.dot(self.normal) > 0.0) == self.is_front
+    }
+
+    /// A ray from here that can't meet its own surface again, nor what lies in the same plane.
+    #[inline]
+    pub(super) fn leave(&self, direction: Vec3) -> Ray {
+        let origin = offset(self.point, self.error, self.normal, direction);
+        Ray { source: Some(self.triangle), ..Ray::new(origin, direction) }
+    }
+
+    /// The ray to a point of a light, ending just before it.
+    #[inline]
+    pub(super) fn reach(&self, wi: Vec3, target: Vec3) -> Ray {
+        let mut ray = self.leave(wi);
+        ray.direction = target - ray.origin;
+        ray.t_max = BEFORE_LIGHT;
+        ray
+    }
+}
+
+/// Rays to lights end this much before them, in fractions of the distance.
+const BEFORE_LIGHT: f32 = 1.0 - 1.0 / 65536.0;
+
+/// `point` moved off its surface, to the side of `direction`, by its error and at least to the next float: right at every scale
+/// and distance from the origin, without a constant in metres.
+#[inline]
+pub(super) fn offset(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> Vec3 {
+    let shift = if direction.dot(normal) < 0.0 { normal * -error } else { normal * error };
+    let moved = point + shift;
+    let away = |moved: f32, shift: f32| {
+        if shift > 0.0 {
+            moved.next_up()
+        } else if shift < 0.0 {
+            moved.next_down()
+        } else {
+            moved
+        }
+    };
+    Vec3::new(away(moved.x, shift.x), away(moved.y, shift.y), away(moved.z, shift.z))
+}

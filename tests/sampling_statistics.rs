@@ -1,0 +1,86 @@
+//! What the film says about itself: determinism, and a variance that is the variance.
+
+mod common;
+
+use common::{lambert, render_scene, scene, small, sphere, square};
+use glam::Vec3;
+use pipeline::color::Rgb;
+use pipeline::scene::environment::Environment;
+use pipeline::scene::{Camera, Scene};
+
+fn test_scene() -> Scene {
+    let camera = Camera::look_at(Vec3::new(1.0, 1.5, 4.0), Vec3::Y * 0.5, Vec3::Y, 0.6);
+    let mut light = lambert(0.0);
+    light.emission.color = pipeline::scene::material::Param::Constant(Rgb::new(8.0, 6.0, 4.0));
+    let mut world = scene(
+        vec![
+            (square(3.0, 0.0), lambert(0.6)),
+            (sphere(0.6, Vec3::Y * 0.6, 16), pipeline::scene::Material::default()),
+            (square(0.5, 2.5), light.clone()),
+        ],
+        camera,
+    );
+    // The light faces down.
+    let mut lamp = (*world.meshes[2]).clone();
+    lamp.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    world.meshes[2] = std::sync::Arc::new(lamp);
+    world.environment = Some(Environment::constant(Rgb::grey(0.2)));
+    world
+}
+
+#[test]
+fn one_and_many_threads_give_the_same_bits() {
+    let world = test_scene();
+    let settings = small(50, 37, 7, 8);
+    let with_threads = |n| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
+        pool.install(|| render_scene(&world, &settings))
+    };
+    let one = with_threads(1);
+    for n in [2, 5] {
+        let many = with_threads(n);
+        assert_eq!(one.raster, many.raster);
+        assert_eq!(one.counts, many.counts);
+    }
+}
+
+#[test]
+fn a_longer_render_begins_with_the_shorter_one_s_samples() {
+    use pipeline::render::{Geometry, Prepared, replay};
+    use std::sync::Arc;
+    let world = Arc::new(test_scene());
+    let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
+    let prepared =
+        |spp| Prepared::new(world.clone(), geometry.clone(), &small(20, 20, spp, 8)).expect("prepared");
+    let (short, long) = (prepared(8), prepared(64));
+    for sample in 0..8 {
+        assert_eq!(replay(&short, 11, 9, sample), replay(&long, 11, 9, sample));
+    }
+}
+
+/// The variance layer, pooled over the image, against the spread of the pixel over 64 seeds.
+#[test]
+fn variance_layer_is_the_spread_over_seeds() {
+    let world = test_scene();
+    let mut settings = small(24, 18, 16, 6);
+    let seeds = 64;
+    let n = 24 * 18;
+    let (mut sum, mut square_sum, mut claimed) = (vec![0.0f64; n], vec![0.0f64; n], vec![0.0f64; n]);
+    for seed in 0..seeds {
+        settings.seed = seed;
+        let rendered = render_scene(&world, &settings);
+        let [_, g, _] = rendered.raster.picture().rgb().expect("colour");
+        let variance =
+            &rendered.raster.layer("data").and_then(|d| d.channel("variance.G")).expect("variance").values;
+        for i in 0..n {
+            sum[i] += f64::from(g[i]);
+            square_sum[i] += f64::from(g[i]) * f64::from(g[i]);
+            claimed[i] += f64::from(variance[i]) / seeds as f64;
+        }
+    }
+    let spread: f64 =
+        (0..n).map(|i| (square_sum[i] - sum[i] * sum[i] / seeds as f64) / (seeds - 1) as f64).sum();
+    let claimed: f64 = claimed.iter().sum();
+    let ratio = claimed / spread;
+    assert!((ratio - 1.0).abs() < 0.06, "claimed {claimed:e}, spread {spread:e}, ratio {ratio}");
+}
