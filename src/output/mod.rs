@@ -1,1 +1,6 @@
-//! What a render leaves behind: names, provenance, layers of a result, tone curves.
+//! What a render leaves behind: provenance in the header, and tone curves for the eye.
+
+mod provenance;
+pub mod tone;
+
+pub use provenance::{Provenance, stamp};

@@ -1,0 +1,117 @@
+//! Which job is the same job.
+
+use std::path::Path;
+
+use blake3::{Hash, Hasher};
+use serde::Serialize;
+
+use super::JobError;
+use crate::import::FileDigest;
+use crate::record::{Job, Override};
+use crate::settings::RenderSettings;
+
+/// The program that renders: the part of identity that all jobs of a run share.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Build {
+    /// Hash of the running executable.
+    pub executable: Hash,
+    /// The crate's version.
+    pub version: &'static str,
+    /// The processor features that the code was compiled for: results are the same bits within a level.
+    pub feature_level: &'static str,
+}
+
+impl Build {
+    /// The build that is running.
+    ///
+    /// # Errors
+    /// If the executable can't be read.
+    pub fn current() -> Result<Self, JobError> {
+        let failed = |path: &Path, cause| JobError::File { path: path.to_owned(), cause };
+        let path = std::env::current_exe().map_err(|cause| failed(Path::new("the running executable"), cause))?;
+        let bytes = std::fs::read(&path).map_err(|cause| failed(&path, cause))?;
+        Ok(Self { executable: blake3::hash(&bytes), version: env!("CARGO_PKG_VERSION"), feature_level: feature_level() })
+    }
+}
+
+const fn feature_level() -> &'static str {
+    if cfg!(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma")) {
+        "x86-64-v3"
+    } else if cfg!(target_arch = "x86_64") {
+        "x86-64"
+    } else if cfg!(target_arch = "aarch64") {
+        "aarch64"
+    } else {
+        "other"
+    }
+}
+
+/// Everything about a job that can change a bit of its image. The name, the place on the axes and the folder are not in it.
+#[derive(Serialize)]
+struct Content<'a> {
+    /// Raised when the same input means another image.
+    format: u32,
+    feature_level: &'a str,
+    files: Vec<(&'a str, String)>,
+    overrides: &'a [Override],
+    settings: &'a RenderSettings,
+}
+
+/// A job's identity and key, as hexadecimal text.
+pub(super) fn identify(
+    job: &Job,
+    files: &[&FileDigest],
+    settings: &RenderSettings,
+    build: &Build,
+) -> (String, String) {
+    let content = Content {
+        format: 1,
+        feature_level: build.feature_level,
+        files: files.iter().map(|f| (f.name.as_str(), f.digest.to_hex().to_string())).collect(),
+        overrides: &job.overrides,
+        settings,
+    };
+    let text = serde_json::to_vec(&content).expect("plain data has a JSON form");
+    let key = blake3::hash(&text);
+    let mut identity = Hasher::new();
+    identity.update(key.as_bytes());
+    identity.update(build.executable.as_bytes());
+    (identity.finalize().to_hex().to_string(), key.to_hex().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Value;
+
+    fn job(roughness: f64) -> Job {
+        Job {
+            name: "a".into(),
+            scene: "s.glb".into(),
+            overrides: vec![Override { path: "material.m.roughness".into(), value: Value::Number(roughness) }],
+            settings: RenderSettings::default(),
+            coordinates: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn identity_follows_content_and_build_and_the_key_content_alone() {
+        let build = |tag: &[u8]| Build { executable: blake3::hash(tag), version: "0", feature_level: "x" };
+        let file = |content: &[u8]| FileDigest { name: "s.glb".into(), digest: blake3::hash(content) };
+        let id = |job: &Job, content: &[u8], tag: &[u8]| {
+            identify(job, &[&file(content)], &job.settings, &build(tag))
+        };
+        let (identity, key) = id(&job(0.5), b"scene", b"one");
+        let mut renamed = job(0.5);
+        renamed.name = "b".into();
+        assert_eq!(id(&renamed, b"scene", b"one"), (identity.clone(), key.clone()));
+        let (other_build, same_key) = id(&job(0.5), b"scene", b"two");
+        assert!(other_build != identity && same_key == key);
+        for (other, other_key) in [id(&job(0.6), b"scene", b"one"), id(&job(0.5), b"changed", b"one")] {
+            assert!(other != identity && other_key != key);
+        }
+        let mut seeded = job(0.5);
+        seeded.settings.seed = 7;
+        assert_ne!(id(&seeded, b"scene", b"one").1, key);
+    }
+}

@@ -1,0 +1,50 @@
+//! A scene file into what all its jobs share.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::JobError;
+use crate::convert::{ConvertOptions, Note, to_disney};
+use crate::import::{FileDigest, ImportOptions, import};
+use crate::record::Warning;
+use crate::render::Geometry;
+use crate::scene::{Named, Scene, framing, studio};
+
+/// A scene, converted and completed, with its triangles in a tree.
+#[derive(Clone, Debug)]
+pub struct LoadedScene {
+    /// Disney materials; at least one camera, and light.
+    pub scene: Arc<Scene>,
+    /// The tree.
+    pub geometry: Arc<Geometry>,
+    /// Every file that was read.
+    pub files: Vec<FileDigest>,
+    /// What conversion has to say on each material.
+    pub notes: Vec<Note>,
+    /// What was noticed.
+    pub warnings: Vec<Warning>,
+}
+
+/// Imports and converts a scene. One without a camera is framed, one without light is lit by a studio, and a warning says so.
+///
+/// # Errors
+/// If the scene can't be read, or has nothing to render.
+pub fn load(path: &Path, import_options: &ImportOptions, convert_options: &ConvertOptions) -> Result<LoadedScene, JobError> {
+    let imported = import(path, import_options)?;
+    let converted = to_disney(imported.scene, convert_options);
+    let mut scene = converted.scene;
+    let mut warnings = imported.warnings;
+    warnings.extend(converted.warnings);
+    let place = path.display().to_string();
+    if scene.cameras.is_empty() {
+        let camera = framing::frame(&scene);
+        scene.cameras.push(Named::new("default", camera));
+        warnings.push(Warning::new(&place, "no camera: the whole scene is framed from three quarters"));
+    }
+    if !studio::is_lit(&scene) {
+        studio::add_studio_lighting(&mut scene);
+        warnings.push(Warning::new(&place, "no light: a studio environment is added"));
+    }
+    let geometry = Arc::new(Geometry::build(&scene)?);
+    Ok(LoadedScene { scene: Arc::new(scene), geometry, files: imported.files, notes: converted.notes, warnings })
+}

@@ -1,0 +1,53 @@
+//! One expanded job, from import to record.
+//!
+//! [`LoadedScene`] is what jobs of one scene share; [`PlannedJob`] is a job with its overrides applied and its identity known;
+//! rendering, writing and comparing it gives a [`crate::record::JobRecord`]. A job that fails is a record too.
+
+mod identity;
+mod load;
+mod run;
+
+use std::path::PathBuf;
+
+pub use identity::Build;
+pub use load::{LoadedScene, load};
+pub use run::{
+    Destination, PlannedJob, References, compare_with_reference, failed_record, finished, image_path, plan, record_path,
+    reference_of, run,
+};
+
+/// Why a job can't be done.
+#[derive(Debug, thiserror::Error)]
+pub enum JobError {
+    /// The scene could not be read.
+    #[error(transparent)]
+    Import(#[from] crate::import::ImportError),
+    /// The scene could not be prepared or rendered.
+    #[error(transparent)]
+    Render(#[from] crate::render::RenderError),
+    /// An override does not fit the scene.
+    #[error(transparent)]
+    Edit(#[from] crate::manifest::edit::EditError),
+    /// An image could not be read or written.
+    #[error(transparent)]
+    ImageFile(#[from] crate::imagefile::ImageFileError),
+    /// A comparison could not be made.
+    #[error(transparent)]
+    Compare(#[from] crate::compare::CompareError),
+    /// A file or folder could not be used.
+    #[error("{}: {cause}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        cause: std::io::Error,
+    },
+    /// A record is not one.
+    #[error("{}: this is not a job's record: {cause}", path.display())]
+    Record {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: serde_json::Error,
+    },
+}

@@ -1,0 +1,266 @@
+//! Planning a job, doing it, and recording how it went.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::identity::identify;
+use super::{Build, JobError, LoadedScene};
+use crate::compare::{self, Options, StrictLimits, Thresholds};
+use crate::imagefile;
+use crate::import::{FileDigest, read_environment};
+use crate::manifest::edit;
+use crate::output::{Provenance, stamp};
+use crate::raster::{Layer, Raster};
+use crate::record::{Counts, CrossCheck, Job, JobRecord, Outcome, Timings, Verdict, Warning};
+use crate::render::{Control, Prepared, Rendered, render};
+use crate::scene::Scene;
+use crate::settings::RenderSettings;
+
+/// A job whose overrides are applied.
+#[derive(Clone, Debug)]
+pub struct PlannedJob {
+    /// The job.
+    pub job: Job,
+    /// The scene with the overrides.
+    pub scene: Arc<Scene>,
+    /// The settings with the overrides.
+    pub settings: RenderSettings,
+    /// Hash of everything that can change a bit (hex).
+    pub identity: String,
+    /// The same without the executable (hex).
+    pub key: String,
+}
+
+/// Where results go and what they are compared with.
+#[derive(Clone, Debug)]
+pub struct Destination {
+    /// The folder of images and records.
+    pub folder: PathBuf,
+    /// The references, if any.
+    pub references: Option<References>,
+}
+
+/// Reference images and how far results may be off.
+#[derive(Clone, Debug)]
+pub struct References {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The built-in comparison's limits.
+    pub limits: StrictLimits,
+    /// The same for `idiff`.
+    pub thresholds: Thresholds,
+    /// The real `idiff`, if it is installed.
+    pub idiff: Option<PathBuf>,
+}
+
+/// The image of a job.
+pub fn image_path(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.exr"))
+}
+
+/// The record of a job.
+pub fn record_path(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.json"))
+}
+
+/// Applies a job's overrides to its scene and works out its identity.
+///
+/// # Errors
+/// If an override does not fit the scene or names an image that can't be read.
+pub fn plan(job: &Job, loaded: &LoadedScene, build: &Build) -> Result<PlannedJob, JobError> {
+    let mut scene = (*loaded.scene).clone();
+    let mut settings = job.settings.clone();
+    let mut images: Vec<FileDigest> = Vec::new();
+    edit::apply_all(&mut scene, &mut settings, &job.overrides, &mut |path| {
+        let (image, digest) = read_environment(path)?;
+        images.push(digest);
+        Ok(image)
+    })?;
+    let files: Vec<&FileDigest> = loaded.files.iter().chain(&images).collect();
+    let (identity, key) = identify(job, &files, &settings, build);
+    Ok(PlannedJob { job: job.clone(), scene: Arc::new(scene), settings, identity, key })
+}
+
+/// The record of an earlier run of the same identity whose image is still what it was; nothing otherwise.
+pub fn finished(planned: &PlannedJob, folder: &Path) -> Option<JobRecord> {
+    let record = read_record(&record_path(folder, &planned.job.name)).ok()?;
+    let same = record.identity == planned.identity && record.outcome == Outcome::Done;
+    let intact = record.outputs.iter().all(|(name, digest)| {
+        fs::read(folder.join(name)).is_ok_and(|bytes| blake3::hash(&bytes).to_hex().as_str() == digest)
+    });
+    (same && intact && !record.outputs.is_empty()).then_some(record)
+}
+
+/// Renders a job, writes its image, compares it, and writes its record last. What fails is told in the record.
+///
+/// # Errors
+/// If not even the record can be written.
+pub fn run(
+    planned: &PlannedJob,
+    loaded: &LoadedScene,
+    build: &Build,
+    destination: &Destination,
+    control: &Control,
+) -> Result<JobRecord, JobError> {
+    let mut record = blank_record(&planned.job, build, &destination.folder);
+    record.identity.clone_from(&planned.identity);
+    record.key.clone_from(&planned.key);
+    record.warnings.clone_from(&loaded.warnings);
+    if let Err(error) = attempt(planned, loaded, build, destination, control, &mut record) {
+        record.outcome = Outcome::Failed { error: error.to_string() };
+    }
+    write_record(&record, &destination.folder)?;
+    Ok(record)
+}
+
+/// The record of a job that could not even be planned, written to its place.
+///
+/// # Errors
+/// If the record can't be written.
+pub fn failed_record(job: &Job, build: &Build, folder: &Path, error: &str) -> Result<JobRecord, JobError> {
+    let mut record = blank_record(job, build, folder);
+    record.outcome = Outcome::Failed { error: error.to_owned() };
+    write_record(&record, folder)?;
+    Ok(record)
+}
+
+fn attempt(
+    planned: &PlannedJob,
+    loaded: &LoadedScene,
+    build: &Build,
+    destination: &Destination,
+    control: &Control,
+    record: &mut JobRecord,
+) -> Result<(), JobError> {
+    let start = Instant::now();
+    let prepared = Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
+    record.size = [prepared.size().0, prepared.size().1];
+    record.skipped = prepared.skipped();
+    record.timings.prepare = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    let Rendered { mut raster, counts } = render(&prepared, control)?;
+    record.timings.render = start.elapsed().as_secs_f64();
+    if counts.bad_samples > 0 {
+        let message = format!("{} samples were not finite or negative and were dropped", counts.bad_samples);
+        record.warnings.push(Warning::new(&planned.job.name, message));
+    }
+    record.counts = counts;
+
+    let start = Instant::now();
+    stamp(
+        &mut raster,
+        &Provenance {
+            identity: &planned.identity,
+            key: &planned.key,
+            job: &planned.job,
+            settings: &planned.settings,
+            build: build.version,
+            feature_level: build.feature_level,
+        },
+    );
+    let encoded = imagefile::encode_exr(&raster)?;
+    let path = image_path(&destination.folder, &planned.job.name);
+    imagefile::write_whole(&path, &encoded.bytes)?;
+    let digest = blake3::hash(&encoded.bytes).to_hex().to_string();
+    record.outputs.insert(format!("{}.exr", planned.job.name), digest);
+    record.outcome = Outcome::Done;
+    if let Some(references) = &destination.references {
+        (record.verdict, record.cross_check) = compare_with_reference(&path, &raster, &planned.job.name, references);
+    }
+    record.timings.output = start.elapsed().as_secs_f64();
+    Ok(())
+}
+
+/// Compares a result with its reference by the built-in comparator, and lets the real `idiff` confirm it. The reference decides
+/// which of the result's channels are compared.
+pub fn compare_with_reference(
+    path: &Path,
+    result: &Raster,
+    name: &str,
+    references: &References,
+) -> (Verdict, CrossCheck) {
+    let reference_path = image_path(&references.folder, name);
+    if !reference_path.exists() {
+        let path = reference_path.display().to_string();
+        return (Verdict::MissingReference { path }, CrossCheck::NotRun);
+    }
+    let outcome = || -> Result<(Verdict, CrossCheck), JobError> {
+        let reference = imagefile::read(&reference_path)?;
+        let comparable = restricted_to(result, &reference);
+        let verdict = compare::compare(&comparable, &reference, &references.limits)?.verdict();
+        let program = references.idiff.as_deref();
+        let check =
+            compare::cross_check(program, path, &reference_path, &references.thresholds, Options::default())?;
+        Ok((verdict, check))
+    };
+    outcome().unwrap_or_else(|error| (Verdict::Error { why: error.to_string() }, CrossCheck::NotRun))
+}
+
+/// The channels of a result that its reference has too; what the result lacks is left out and shows as a difference of shape.
+fn restricted_to(result: &Raster, reference: &Raster) -> Raster {
+    let layers = reference
+        .layers
+        .iter()
+        .filter_map(|wanted| {
+            let layer = result.layer(&wanted.name)?;
+            let channels = layer.channels.iter().filter(|c| wanted.channel(&c.name).is_some()).cloned().collect();
+            Some(Layer { channels, ..layer.clone() })
+        })
+        .collect();
+    Raster { display: result.display, layers }
+}
+
+/// What a reference keeps of a result: the picture, its variance and its sample counts. All that a comparison needs, at less than
+/// half the size.
+pub fn reference_of(result: &Raster) -> Raster {
+    let keeps = |layer: &Layer, channel: &str| {
+        layer.name == "beauty" || channel == "samples" || channel.starts_with("variance.")
+    };
+    let layers = result
+        .layers
+        .iter()
+        .map(|layer| {
+            let channels = layer.channels.iter().filter(|c| keeps(layer, &c.name)).cloned().collect();
+            Layer { channels, ..layer.clone() }
+        })
+        .filter(|layer: &Layer| !layer.channels.is_empty())
+        .collect();
+    Raster { display: result.display, layers }
+}
+
+fn blank_record(job: &Job, build: &Build, folder: &Path) -> JobRecord {
+    let earlier = read_record(&record_path(folder, &job.name)).map_or(0, |r| r.attempt);
+    JobRecord {
+        job: job.clone(),
+        identity: String::new(),
+        key: String::new(),
+        outcome: Outcome::Done,
+        verdict: Verdict::NotCompared,
+        cross_check: CrossCheck::NotRun,
+        size: [0, 0],
+        counts: Counts::default(),
+        skipped: Vec::new(),
+        warnings: Vec::new(),
+        timings: Timings::default(),
+        host: format!("{} {} ({})", std::env::consts::OS, std::env::consts::ARCH, build.feature_level),
+        attempt: earlier.saturating_add(1),
+        outputs: BTreeMap::new(),
+    }
+}
+
+fn read_record(path: &Path) -> Result<JobRecord, JobError> {
+    let bytes = fs::read(path).map_err(|cause| JobError::File { path: path.to_owned(), cause })?;
+    serde_json::from_slice(&bytes).map_err(|cause| JobError::Record { path: path.to_owned(), cause })
+}
+
+/// Writes a record to its place.
+fn write_record(record: &JobRecord, folder: &Path) -> Result<(), JobError> {
+    let path = record_path(folder, &record.job.name);
+    let mut text = serde_json::to_vec_pretty(record).expect("plain data has a JSON form");
+    text.push(b'\n');
+    Ok(imagefile::write_whole(&path, &text)?)
+}
