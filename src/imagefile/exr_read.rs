@@ -96,11 +96,11 @@ impl Filling {
     fn new(part: PartHead) -> Self {
         let mut layer = Layer::new(part.name, part.window);
         layer.attributes = part.attributes;
-        let zeros = vec![0.0; part.window.pixels()];
+        let pixels = part.window.pixels();
         layer.channels = part
             .channels
             .into_iter()
-            .map(|c| Channel { name: c.name, stored_as: c.sample_type, values: zeros.clone() })
+            .map(|c| Channel { name: c.name, stored_as: c.sample_type, values: vec![0.0; pixels] })
             .collect();
         Self { layer, seen: BTreeSet::new(), pixels: 0 }
     }
