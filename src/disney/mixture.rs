@@ -99,11 +99,11 @@ impl<F: Real> Mixture<F> {
         if rest < F::ZERO {
             return (cosine_hemisphere(u), Lobe::Diffuse);
         }
-        rest = rest - chance.uniform;
+        rest -= chance.uniform;
         if rest < F::ZERO {
             return (uniform_hemisphere(u), Lobe::Diffuse);
         }
-        rest = rest - chance.clearcoat;
+        rest -= chance.clearcoat;
         match &self.clearcoat {
             Some(coat) if rest < F::ZERO => (coat.sample(wo, u), Lobe::Clearcoat),
             _ => (self.specular.sample(wo, u), Lobe::Specular),

@@ -27,13 +27,12 @@ impl<F: Real> Pair<F> {
     /// horizon both: there is no half vector.
     #[inline]
     pub(super) fn new(wo: V3<F>, wi: V3<F>) -> Option<Self> {
-        if !(wo.z > F::ZERO && wi.z > F::ZERO) {
-            return None;
-        }
         let sum = wo + wi;
         let sum2 = sum.length_squared();
-        // Written so that NaN goes the same way.
-        if !(sum2 > F::of(1e-30) && sum2 < F::of(5.0)) {
+        let above = wo.z > F::ZERO && wi.z > F::ZERO;
+        // NaN and infinite components fail the comparison too.
+        let has_half_vector = sum2 > F::of(1e-30) && sum2.is_finite();
+        if !(above && has_half_vector) {
             return None;
         }
         // Not |wo + wi|/2, which is the same for exact unit vectors alone.
