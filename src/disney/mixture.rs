@@ -57,7 +57,7 @@ impl<F: Real> Mixture<F> {
         if let Some(sheen) = &self.sheen {
             cosine += sheen.albedo(schlick_o);
         }
-        let specular = self.specular.albedo(schlick_o);
+        let specular = self.specular.albedo(wo, schlick_o);
         let clearcoat = self.clearcoat.as_ref().map_or(F::ZERO, |coat| coat.albedo(wo.z, schlick_o));
         let scale = F::ONE / (cosine + uniform + specular + clearcoat);
         Probabilities {

@@ -49,7 +49,7 @@ impl<F: Real> Specular<F> {
 
     /// An estimate of the reflected part of light, from Schlick's weight at `wo`. Never 0: even where F0 is, light is reflected.
     #[inline]
-    pub(super) fn albedo(&self, schlick_o: F) -> F {
+    pub(super) fn albedo(&self, _wo: V3<F>, schlick_o: F) -> F {
         let rough = self.roughness.sqr();
         let edge = schlick_o * (F::ONE - F::of(0.7) * rough) + F::of(0.005) + F::of(0.02) * rough;
         self.mean_f0 + (F::ONE - self.mean_f0).max(F::ZERO) * edge
