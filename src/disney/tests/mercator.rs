@@ -32,8 +32,8 @@ impl Mercator {
     pub(super) fn cell(&self, w: V3<f64>) -> usize {
         let (x, y, z) = (w.dot(self.x), w.dot(self.y), w.dot(self.z));
         // tan(θ/2) = sin θ/(1 + cos θ).
-        let s = ((x * x + y * y).sqrt() / (1.0 + z).max(1e-12)).max(1e-12).ln();
-        let phi = y.atan2(x) / (2.0 * f64::PI) + 0.5;
+        let s = Real::ln(((x * x + y * y).sqrt() / (1.0 + z).max(1e-12)).max(1e-12));
+        let phi = Real::atan2(y, x) / (2.0 * f64::PI) + 0.5;
         let row = ((s - S[0]) / (S[1] - S[0]) * ROWS as f64).clamp(0.0, ROWS as f64 - 1.0) as usize;
         let column = (phi * COLUMNS as f64).clamp(0.0, COLUMNS as f64 - 1.0) as usize;
         row * COLUMNS + column
@@ -56,15 +56,20 @@ impl Mercator {
         let ds = (S[1] - S[0]) / (ROWS * n) as f64;
         let dphi = 2.0 * f64::PI / (COLUMNS * n) as f64;
         let (row, column) = (cell / COLUMNS, cell % COLUMNS);
+        let around: Vec<V3<f64>> = (0..n)
+            .map(|j| {
+                let phi = -f64::PI + ((column * n + j) as f64 + 0.5) * dphi;
+                self.x * Real::cos(phi) + self.y * Real::sin(phi)
+            })
+            .collect();
         let mut sum = 0.0;
         for i in 0..n {
-            let e = (S[0] + ((row * n + i) as f64 + 0.5) * ds).exp();
+            let e = Real::exp(S[0] + ((row * n + i) as f64 + 0.5) * ds);
             // sin θ = 1/cosh s, cos θ = -tanh s.
             let sin = 2.0 * e / (1.0 + e * e);
             let cos = (1.0 - e * e) / (1.0 + e * e);
-            for j in 0..n {
-                let phi = -f64::PI + ((column * n + j) as f64 + 0.5) * dphi;
-                let w = self.x * (sin * phi.cos()) + self.y * (sin * phi.sin()) + self.z * cos;
+            for &across in &around {
+                let w = across * sin + self.z * cos;
                 sum += f(w) * sin * sin;
             }
         }

@@ -122,60 +122,41 @@ fn mixed_materials() -> Vec<Twin> {
     use DiffuseModel::{Burley, Lambert, LambertFresnel};
     use Masking::{Matched, Remapped};
     use Parameter as P;
-    let color = Rgb::new(0.7, 0.3, 0.1);
-    let recipes: [(&str, &[(P, f32)], Masking, DiffuseModel); 12] = [
-        ("plastic", &[], Matched, Burley),
-        ("polished plastic", &[(P::Roughness, 0.1)], Remapped, Burley),
-        ("rough", &[(P::Roughness, 1.0), (P::Specular, 1.0)], Matched, LambertFresnel),
-        ("metal", &[(P::Metallic, 1.0), (P::Roughness, 0.3)], Matched, Burley),
-        (
-            "brushed metal",
-            &[(P::Metallic, 1.0), (P::Roughness, 0.4), (P::Anisotropic, 1.0)],
-            Remapped,
-            Burley,
-        ),
-        ("mirror-like metal", &[(P::Metallic, 1.0), (P::Roughness, 0.0)], Matched, Burley),
-        ("cloth", &[(P::Sheen, 1.0), (P::Roughness, 0.9), (P::Specular, 0.0)], Matched, Lambert),
-        ("wax", &[(P::Subsurface, 1.0), (P::Roughness, 0.6)], Matched, Burley),
-        (
-            "half wax",
-            &[(P::Subsurface, 0.5), (P::Roughness, 0.2), (P::Clearcoat, 0.5)],
-            Remapped,
-            LambertFresnel,
-        ),
-        ("car paint", &[(P::Metallic, 0.5), (P::Clearcoat, 1.0)], Matched, Burley),
-        (
-            "satin coat",
-            &[(P::Clearcoat, 4.0), (P::ClearcoatGloss, 0.0), (P::Roughness, 0.7)],
-            Remapped,
-            Burley,
-        ),
-        (
-            "everything",
-            &[
-                (P::Metallic, 0.3),
-                (P::Subsurface, 0.4),
-                (P::SpecularTint, 0.8),
-                (P::Roughness, 0.25),
-                (P::Anisotropic, 0.7),
-                (P::Sheen, 0.6),
-                (P::Clearcoat, 0.9),
-                (P::ClearcoatGloss, 0.8),
-            ],
-            Remapped,
-            Burley,
-        ),
+    let brushed = [(P::Metallic, 1.0), (P::Roughness, 0.4), (P::Anisotropic, 1.0)];
+    let half_wax = [(P::Subsurface, 0.5), (P::Roughness, 0.2), (P::Clearcoat, 0.5)];
+    let satin = [(P::Clearcoat, 4.0), (P::ClearcoatGloss, 0.0), (P::Roughness, 0.7)];
+    let everything = [
+        (P::Metallic, 0.3),
+        (P::Subsurface, 0.4),
+        (P::SpecularTint, 0.8),
+        (P::Roughness, 0.25),
+        (P::Anisotropic, 0.7),
+        (P::Sheen, 0.6),
+        (P::Clearcoat, 0.9),
+        (P::ClearcoatGloss, 0.8),
     ];
-    recipes
-        .into_iter()
-        .map(|(name, scalars, masking, diffuse)| {
-            let mut params = Params { base_color: color, ..Params::default() };
-            for (parameter, value) in scalars {
-                *params.get_mut(*parameter) = *value;
-            }
-            Twin::disney(name, &params, masking, diffuse)
-        })
-        .collect()
+    vec![
+        recipe("plastic", &[], Matched, Burley),
+        recipe("polished plastic", &[(P::Roughness, 0.1)], Remapped, Burley),
+        recipe("rough", &[(P::Roughness, 1.0), (P::Specular, 1.0)], Matched, LambertFresnel),
+        recipe("metal", &[(P::Metallic, 1.0), (P::Roughness, 0.3)], Matched, Burley),
+        recipe("brushed metal", &brushed, Remapped, Burley),
+        recipe("mirror-like metal", &[(P::Metallic, 1.0), (P::Roughness, 0.0)], Matched, Burley),
+        recipe("cloth", &[(P::Sheen, 1.0), (P::Roughness, 0.9), (P::Specular, 0.0)], Matched, Lambert),
+        recipe("wax", &[(P::Subsurface, 1.0), (P::Roughness, 0.6)], Matched, Burley),
+        recipe("half wax", &half_wax, Remapped, LambertFresnel),
+        recipe("car paint", &[(P::Metallic, 0.5), (P::Clearcoat, 1.0)], Matched, Burley),
+        recipe("satin coat", &satin, Remapped, Burley),
+        recipe("everything", &everything, Remapped, Burley),
+    ]
+}
+
+fn recipe(name: &str, scalars: &[(Parameter, f32)], masking: Masking, diffuse: DiffuseModel) -> Twin {
+    let mut params = Params { base_color: Rgb::new(0.7, 0.3, 0.1), ..Params::default() };
+    for (parameter, value) in scalars {
+        *params.get_mut(*parameter) = *value;
+    }
+    Twin::disney(name, &params, masking, diffuse)
 }
 
 /// Views from the normal to grazing, off the axes of anisotropy.
