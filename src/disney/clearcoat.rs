@@ -1,5 +1,6 @@
 //! The clearcoat: a second, achromatic specular lobe with GTR1's long tail.
 
+use super::fresnel::schlick_weight;
 use super::microfacet::{Gtr1, smith_isotropic};
 use super::pair::Pair;
 use super::parameter::Params;
@@ -28,12 +29,11 @@ impl<F: Real> Clearcoat<F> {
         Some(Self { strength: F::of(0.25) * params.clearcoat, distribution: Gtr1::new(alpha) })
     }
 
-    /// An estimate of the reflected part of light, from Schlick's weight at `wo`: the value for a narrow peak.
+    /// An estimate of the reflected part of light: a fit to the integral, within a third of it at any gloss.
     #[inline]
-    pub(super) fn albedo(&self, cos_o: F, schlick_o: F) -> F {
-        let masking = smith_isotropic(cos_o, F::of(MASKING_ALPHA)) * cos_o;
-        let fresnel = F::of(F0) + F::of(1.0 - F0) * schlick_o;
-        self.strength * (F::of(4.0) * fresnel * masking.sqr() + F::of(0.01))
+    pub(super) fn albedo(&self, wo: V3<F>) -> F {
+        let grazing = (F::of(3.0) * schlick_weight(wo.z)).min(F::ONE);
+        self.strength * (F::of(0.035) + F::of(0.125) * grazing)
     }
 
     /// 0.25·clearcoat·G·F·D (Burley 2012, section 5.4, and disney.brdf), the same in all channels, and the density of

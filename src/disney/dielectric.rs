@@ -8,10 +8,8 @@ use crate::math::{Real, V3};
 /// `wo` mirrored about the normal, with all light.
 #[inline]
 pub(super) fn sample_mirror<F: Real>(wo: V3<F>) -> Option<BsdfSample<F>> {
-    if !(wo.z > F::ZERO) {
-        return None;
-    }
-    delta(V3::new(-wo.x, -wo.y, wo.z), F::ONE, F::ONE, Lobe::Mirror, F::ONE)
+    let wi = V3::new(-wo.x, -wo.y, wo.z);
+    if wo.z > F::ZERO { delta(wi, F::ONE, F::ONE, Lobe::Mirror, F::ONE) } else { None }
 }
 
 /// A smooth dielectric.
@@ -28,12 +26,8 @@ impl<F: Real> Dielectric<F> {
     /// section 5.2).
     #[inline]
     pub(super) fn sample(&self, wo: V3<F>, u_lobe: F) -> Option<BsdfSample<F>> {
-        let cos_o = wo.z.abs();
-        if !(cos_o > F::ZERO) {
-            return None;
-        }
         let eta = if wo.z > F::ZERO { self.ior } else { F::ONE / self.ior };
-        let split = dielectric_split(cos_o, wo.x.sqr() + wo.y.sqr(), eta);
+        let split = dielectric_split(wo.z.abs(), eta);
         if u_lobe < split.reflectance {
             let wi = V3::new(-wo.x, -wo.y, wo.z);
             delta(wi, split.reflectance, split.reflectance, Lobe::DielectricReflection, F::ONE)

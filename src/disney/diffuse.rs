@@ -4,7 +4,7 @@ use super::fresnel::schlick_weight;
 use super::pair::Pair;
 use super::parameter::{DiffuseModel, Params};
 use crate::color::Rgb;
-use crate::math::Real;
+use crate::math::{Real, V3};
 
 /// The base colour's diffuse reflection, scaled by 1 - metallic.
 #[derive(Clone, Copy, Debug)]
@@ -16,37 +16,57 @@ pub(super) struct Diffuse<F> {
     roughness: F,
     subsurface: F,
     model: DiffuseModel,
-    /// The reflectance that lobe probabilities are made of, without and with the subsurface blend's weight.
-    cosine_albedo: F,
-    uniform_albedo: F,
+    // Coefficients of `albedos`, for the plain shape and for the subsurface's.
+    plain: F,
+    plain_rise: F,
+    flat: F,
+    flat_rise: F,
 }
 
 impl<F: Real> Diffuse<F> {
     /// `None` where the lobe reflects nothing.
     pub(super) fn new(params: &Params<F>, f0: Rgb<F>, model: DiffuseModel) -> Option<Self> {
         let reflectance = params.base_color * (F::ONE - params.metallic);
-        if reflectance.is_black() {
+        let diffuse_part = match model {
+            DiffuseModel::Burley | DiffuseModel::Lambert => reflectance,
+            DiffuseModel::LambertFresnel => reflectance * f0.map(|f0| (F::ONE - f0).max(F::ZERO)),
+        };
+        let mean = diffuse_part.mean();
+        if mean == F::ZERO {
             return None;
         }
-        let mean = reflectance.mean();
+        let retro = match model {
+            DiffuseModel::Burley => F::of(1.05) * params.roughness - F::of(0.5),
+            DiffuseModel::Lambert | DiffuseModel::LambertFresnel => F::ZERO,
+        };
+        let plain = mean * (F::ONE - params.subsurface);
+        let flat = mean * params.subsurface;
         Some(Self {
             color: reflectance * F::FRAC_1_PI,
             f0,
             roughness: params.roughness,
             subsurface: params.subsurface,
             model,
-            cosine_albedo: mean * (F::ONE - F::of(0.5) * params.subsurface),
-            uniform_albedo: mean * F::of(0.5) * params.subsurface,
+            plain,
+            plain_rise: plain * retro,
+            flat,
+            flat_rise: flat * (F::of(0.9) * params.roughness - F::of(0.7)),
         })
     }
 
-    /// An estimate of the reflected part of light for the cosine sampler and for the uniform one.
+    /// An estimate of the reflected part of light, a fit to the integral: for the cosine sampler and for the uniform one.
     ///
     /// The subsurface shape holds 1/(cos θi + cos θo), which cosine sampling would turn into unbounded weights at grazing angles; a
-    /// uniform direction has f·cos/pdf ∝ cos θi/(cos θi + cos θo) ≤ 1. So half of that shape's part is sampled uniformly.
+    /// uniform direction has f·cos/pdf ∝ cos θi/(cos θi + cos θo) ≤ 1. So the flatter the view, the more of that shape's part is sampled
+    /// uniformly.
     #[inline]
-    pub(super) fn albedos(&self) -> (F, F) {
-        (self.cosine_albedo, self.uniform_albedo)
+    pub(super) fn albedos(&self, wo: V3<F>) -> (F, F) {
+        let slant = (F::ONE - wo.z).max(F::ZERO);
+        let schlick_o = schlick_weight(wo.z);
+        let plain = self.plain + self.plain_rise * schlick_o;
+        let flat = self.flat * (F::of(0.75) + F::of(0.6) * slant) + self.flat_rise * schlick_o;
+        let uniform = F::of(0.75) * slant * flat;
+        (plain + flat - uniform, uniform)
     }
 
     /// The BRDF.

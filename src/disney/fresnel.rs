@@ -17,29 +17,27 @@ pub(super) struct DielectricSplit<F> {
     pub(super) cos_t: F,
 }
 
-/// The split at an interface whose far side has `eta` times the near side's refractive index.
-///
-/// Takes cosine and squared sine of the incident angle, both, since neither follows from the other without loss.
+/// The split at an interface whose far side has `eta` > 0 times the near side's refractive index, by Fresnel's equations.
 #[inline]
-pub(super) fn dielectric_split<F: Real>(cos_i: F, sin2_i: F, eta: F) -> DielectricSplit<F> {
-    let cos2_t = F::ONE - sin2_i / eta.sqr();
-    if cos2_t <= F::ZERO {
+pub(super) fn dielectric_split<F: Real>(cos_i: F, eta: F) -> DielectricSplit<F> {
+    // eta² cos² θt = eta² - sin² θi, without the cancellation near eta = 1 and at grazing angles.
+    let scaled_cos2_t = (eta - F::ONE) * (eta + F::ONE) + cos_i.sqr();
+    if scaled_cos2_t <= F::ZERO {
         return DielectricSplit { reflectance: F::ONE, cos_t: F::ZERO };
     }
-    let cos_t = cos2_t.sqrt();
+    let cos_t = scaled_cos2_t.sqrt() / eta;
     let r_parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let r_perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     let reflectance = F::of(0.5) * (r_parallel.sqr() + r_perpendicular.sqr());
     DielectricSplit { reflectance: reflectance.min(F::ONE), cos_t }
 }
 
-/// The reflectance of a smooth dielectric for unpolarised light (Fresnel's equations), 1 under total internal reflection.
+/// The reflectance of a smooth dielectric for unpolarised light, 1 under total internal reflection.
 ///
-/// `cos_i` in [0, 1] is measured from the normal on light's side; `eta` > 0 is the far side's refractive index over the near side's.
+/// `cos_i` in (0, 1] is the cosine of the incident angle; `eta` > 0 the far side's refractive index over the near side's.
 #[inline]
 pub fn fresnel_dielectric<F: Real>(cos_i: F, eta: F) -> F {
-    let sin2_i = ((F::ONE - cos_i) * (F::ONE + cos_i)).max(F::ZERO);
-    dielectric_split(cos_i, sin2_i, eta).reflectance
+    dielectric_split(cos_i, eta).reflectance
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 use super::bsdf::Lobe;
 use super::clearcoat::Clearcoat;
 use super::diffuse::Diffuse;
-use super::fresnel::schlick_weight;
 use super::pair::Pair;
 use super::parameter::{DiffuseModel, Masking, Params};
 use super::sheen::Sheen;
@@ -52,13 +51,12 @@ impl<F: Real> Mixture<F> {
     /// lobe probabilities. A lobe that is there never has probability 0.
     #[inline]
     pub(super) fn probabilities(&self, wo: V3<F>) -> Probabilities<F> {
-        let schlick_o = schlick_weight(wo.z);
-        let (mut cosine, uniform) = self.diffuse.as_ref().map_or((F::ZERO, F::ZERO), Diffuse::albedos);
+        let (mut cosine, uniform) = self.diffuse.as_ref().map_or((F::ZERO, F::ZERO), |d| d.albedos(wo));
         if let Some(sheen) = &self.sheen {
-            cosine += sheen.albedo(schlick_o);
+            cosine += sheen.albedo(wo);
         }
-        let specular = self.specular.albedo(schlick_o);
-        let clearcoat = self.clearcoat.as_ref().map_or(F::ZERO, |coat| coat.albedo(wo.z, schlick_o));
+        let specular = self.specular.albedo(wo);
+        let clearcoat = self.clearcoat.as_ref().map_or(F::ZERO, |coat| coat.albedo(wo));
         let scale = F::ONE / (cosine + uniform + specular + clearcoat);
         Probabilities {
             cosine: cosine * scale,
@@ -99,11 +97,11 @@ impl<F: Real> Mixture<F> {
         if rest < F::ZERO {
             return (cosine_hemisphere(u), Lobe::Diffuse);
         }
-        rest = rest - chance.uniform;
+        rest -= chance.uniform;
         if rest < F::ZERO {
             return (uniform_hemisphere(u), Lobe::Diffuse);
         }
-        rest = rest - chance.clearcoat;
+        rest -= chance.clearcoat;
         match &self.clearcoat {
             Some(coat) if rest < F::ZERO => (coat.sample(wo, u), Lobe::Clearcoat),
             _ => (self.specular.sample(wo, u), Lobe::Specular),

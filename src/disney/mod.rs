@@ -16,6 +16,8 @@ mod pair;
 mod parameter;
 mod sheen;
 mod specular;
+#[cfg(test)]
+mod tests;
 
 pub use bsdf::{Bsdf, BsdfSample, Lobe};
 pub use fresnel::{fresnel_dielectric, schlick_weight};

@@ -5,7 +5,7 @@ use crate::math::{Real, V3};
 /// Two directions above the surface with the terms all lobes share.
 ///
 /// Terms are symmetric in the two directions as far as both have unit length: in `f32` reciprocity holds to about
-/// 10⁻⁶/|wo + wi|.
+/// 10⁻⁶/|wo + wi|².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pair<F> {
     /// To the viewer.
@@ -23,17 +23,15 @@ pub(super) struct Pair<F> {
 }
 
 impl<F: Real> Pair<F> {
-    /// `None` unless both directions are above the horizon. Also where they are opposite to within rounding, 10⁻¹⁵ above the
-    /// horizon both: there is no half vector.
+    /// `None` unless both directions are above the horizon and finite. Also where their cosines sum to less than 10⁻¹⁵: opposite
+    /// directions have no half vector then, and 1/cos θ would not be finite for long.
     #[inline]
     pub(super) fn new(wo: V3<F>, wi: V3<F>) -> Option<Self> {
-        if !(wo.z > F::ZERO && wi.z > F::ZERO) {
-            return None;
-        }
         let sum = wo + wi;
         let sum2 = sum.length_squared();
-        // Written so that NaN goes the same way.
-        if !(sum2 > F::of(1e-30) && sum2 < F::of(5.0)) {
+        let above = wo.z > F::ZERO && wi.z > F::ZERO;
+        let has_half_vector = sum.z > F::of(1e-15) && sum2.is_finite();
+        if !(above && has_half_vector) {
             return None;
         }
         // Not |wo + wi|/2, which is the same for exact unit vectors alone.

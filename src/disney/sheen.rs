@@ -3,7 +3,7 @@
 use super::pair::Pair;
 use super::parameter::Params;
 use crate::color::Rgb;
-use crate::math::Real;
+use crate::math::{Real, V3};
 
 /// The sheen term. It is broad, and sampled by the cosine together with the diffuse lobe.
 #[derive(Clone, Copy, Debug)]
@@ -20,10 +20,11 @@ impl<F: Real> Sheen<F> {
         (!color.is_black()).then(|| Self { color, mean: color.mean() })
     }
 
-    /// An estimate of the reflected part of light, from Schlick's weight at `wo`.
+    /// An estimate of the reflected part of light: a fit to the integral.
     #[inline]
-    pub(super) fn albedo(&self, schlick_o: F) -> F {
-        self.mean * (F::of(0.002) + F::of(0.12) * schlick_o)
+    pub(super) fn albedo(&self, wo: V3<F>) -> F {
+        let slant = (F::ONE - wo.z).max(F::ZERO);
+        self.mean * (F::of(0.002) + F::of(0.088) * slant.sqr() * slant)
     }
 
     /// sheen·lerp(1, tint, sheen_tint)·(1 - metallic)·(1 - cos θd)⁵, without a 1/π (Burley 2012, section 5.5, and disney.brdf).

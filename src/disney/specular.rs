@@ -10,7 +10,6 @@ use crate::math::{Real, V3};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Specular<F> {
     f0: Rgb<F>,
-    mean_f0: F,
     distribution: Gtr2<F>,
     /// Of D, and so of the normals that the sampler takes for visible.
     alpha: Alpha<F>,
@@ -18,6 +17,12 @@ pub(super) struct Specular<F> {
     masking_alpha: Alpha<F>,
     masking: Masking,
     roughness: F,
+    // Coefficients of `albedo`: of the part that F0 reflects, and of the part that Schlick's weight adds.
+    base: F,
+    base_rise: F,
+    edge_share: F,
+    edge: F,
+    edge_spread: F,
 }
 
 /// lerp(0.08·specular·lerp(1, tint, specular_tint), base_color, metallic); may exceed 1.
@@ -36,23 +41,40 @@ impl<F: Real> Specular<F> {
                 alpha_from_roughness(half + half * params.roughness, params.anisotropic)
             }
         };
+        let a = params.roughness.sqr();
+        let mean_f0 = f0.mean();
         Self {
             f0,
-            mean_f0: f0.mean(),
             distribution: Gtr2::new(alpha),
             alpha,
             masking_alpha,
             masking,
             roughness: params.roughness,
+            base: mean_f0 * (F::ONE - F::of(0.69) * a),
+            base_rise: mean_f0 * F::of(0.3) * a,
+            edge_share: (F::ONE - mean_f0).max(F::of(0.01)),
+            edge: F::ONE / (F::ONE + F::of(6.5) * a).sqr(),
+            edge_spread: (F::of(4.0) * a).min(F::ONE),
         }
     }
 
-    /// An estimate of the reflected part of light, from Schlick's weight at `wo`. Never 0: even where F0 is, light is reflected.
+    /// An estimate of the reflected part of light, a fit to the integral, rough where the lobe is dim. Never 0: light is reflected
+    /// even where F0 is 0.
     #[inline]
-    pub(super) fn albedo(&self, schlick_o: F) -> F {
-        let rough = self.roughness.sqr();
-        let edge = schlick_o * (F::ONE - F::of(0.7) * rough) + F::of(0.005) + F::of(0.02) * rough;
-        self.mean_f0 + (F::ONE - self.mean_f0).max(F::ZERO) * edge
+    pub(super) fn albedo(&self, wo: V3<F>) -> F {
+        let slant = (F::ONE - wo.z).max(F::ZERO);
+        let smooth_edge = slant.pow5();
+        let rough_edge = slant.sqr() * slant;
+        let edge = self.edge * smooth_edge.lerp(rough_edge, self.edge_spread) + F::of(0.002);
+        let albedo = self.base + self.base_rise * smooth_edge + self.edge_share * edge;
+        match self.masking {
+            Masking::Matched => albedo,
+            Masking::Remapped => {
+                // Both directions are masked more than D's own alpha says; the light's less so the wider the lobe.
+                let masked = smith(wo, self.masking_alpha) / smith(wo, self.alpha);
+                albedo * masked * masked.lerp(F::ONE, self.roughness)
+            }
+        }
     }
 
     /// The BRDF G·F·D (Burley 2012, section 5.4; G holds the 1/(4 cos θi cos θo)), and the density of [`Self::sample`] per unit solid

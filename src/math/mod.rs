@@ -6,6 +6,7 @@ pub mod frame;
 pub mod hash;
 mod real;
 pub mod sobol;
+pub mod stats;
 mod vec3;
 pub mod warp;
 

@@ -1,0 +1,168 @@
+//! Tests of the whole BSDF: consistency, distribution, energy, extremes. This file holds what they share.
+
+mod albedo;
+mod chi2;
+mod consistency;
+mod delta;
+mod mercator;
+mod stress;
+
+use super::{Bsdf, DiffuseModel, Masking, Parameter, Params};
+use crate::color::Rgb;
+use crate::math::{Real, V3, hash};
+
+/// Numbers in [0, 1) from a seed and a running count.
+struct Random {
+    seed: u64,
+    count: u64,
+}
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        Self { seed, count: 0 }
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.count += 1;
+        hash::combine(self.seed, self.count)
+    }
+
+    fn unit(&mut self) -> f32 {
+        hash::unit_f32((self.bits() >> 32) as u32)
+    }
+
+    fn square(&mut self) -> [f32; 2] {
+        [self.unit(), self.unit()]
+    }
+
+    /// In [0, 1], at an end a third of the time.
+    fn parameter(&mut self) -> f32 {
+        match self.bits() % 6 {
+            0 => 0.0,
+            1 => 1.0,
+            _ => self.unit(),
+        }
+    }
+
+    fn params(&mut self) -> Params {
+        let mut params = Params {
+            base_color: Rgb::new(self.parameter(), self.parameter(), self.parameter()),
+            ..Params::default()
+        };
+        for p in Parameter::ALL {
+            *params.get_mut(p) = self.parameter() * p.max().min(4.0);
+        }
+        params
+    }
+
+    fn masking(&mut self) -> Masking {
+        if self.bits().is_multiple_of(2) { Masking::Matched } else { Masking::Remapped }
+    }
+
+    fn diffuse_model(&mut self) -> DiffuseModel {
+        match self.bits() % 3 {
+            0 => DiffuseModel::Burley,
+            1 => DiffuseModel::Lambert,
+            _ => DiffuseModel::LambertFresnel,
+        }
+    }
+
+    /// Of the upper hemisphere, with a cosine down to 10⁻⁷ a quarter of the time.
+    fn direction(&mut self) -> V3<f32> {
+        let z = match self.bits() % 4 {
+            0 => Real::powf(10.0, -7.0 * self.unit()),
+            _ => 1.0 - self.unit(),
+        };
+        let r = ((1.0 - z) * (1.0 + z)).safe_sqrt();
+        let phi = 2.0 * std::f32::consts::PI * self.unit();
+        V3::new(r * Real::cos(phi), r * Real::sin(phi), z)
+    }
+
+    /// Two directions; a third of the time near each other's mirror direction, now and then exactly there.
+    fn pair(&mut self) -> (V3<f32>, V3<f32>) {
+        let wo = self.direction();
+        if !self.bits().is_multiple_of(3) {
+            return (wo, self.direction());
+        }
+        let size = if self.bits().is_multiple_of(4) { 0.0 } else { Real::powf(10.0, -5.0 * self.unit()) };
+        let off = V3::new(self.unit() - 0.5, self.unit() - 0.5, self.unit() - 0.5) * size;
+        let wi = (V3::new(-wo.x, -wo.y, wo.z) + off).normalize();
+        (wo, V3::new(wi.x, wi.y, wi.z.abs().max(1e-7)))
+    }
+}
+
+fn cast(params: &Params) -> Params<f64> {
+    let mut twin = Params::<f64> { base_color: params.base_color.cast(), ..Params::default() };
+    for p in Parameter::ALL {
+        *twin.get_mut(p) = f64::from(params.get(p));
+    }
+    twin
+}
+
+/// A material with its `f64` twin.
+#[derive(Clone)]
+struct Twin {
+    name: String,
+    single: Bsdf<f32>,
+    double: Bsdf<f64>,
+}
+
+impl Twin {
+    fn disney(name: &str, params: &Params, masking: Masking, diffuse: DiffuseModel) -> Self {
+        Self {
+            name: format!("{name} {masking:?} {diffuse:?}"),
+            single: Bsdf::disney(params, masking, diffuse),
+            double: Bsdf::disney(&cast(params), masking, diffuse),
+        }
+    }
+}
+
+/// Materials that mix the lobes in different ways, from a satin to a smooth, coated, anisotropic one.
+fn mixed_materials() -> Vec<Twin> {
+    use DiffuseModel::{Burley, Lambert, LambertFresnel};
+    use Masking::{Matched, Remapped};
+    use Parameter as P;
+    let brushed = [(P::Metallic, 1.0), (P::Roughness, 0.4), (P::Anisotropic, 1.0)];
+    let half_wax = [(P::Subsurface, 0.5), (P::Roughness, 0.2), (P::Clearcoat, 0.5)];
+    let satin = [(P::Clearcoat, 4.0), (P::ClearcoatGloss, 0.0), (P::Roughness, 0.7)];
+    let everything = [
+        (P::Metallic, 0.3),
+        (P::Subsurface, 0.4),
+        (P::SpecularTint, 0.8),
+        (P::Roughness, 0.25),
+        (P::Anisotropic, 0.7),
+        (P::Sheen, 0.6),
+        (P::Clearcoat, 0.9),
+        (P::ClearcoatGloss, 0.8),
+    ];
+    vec![
+        recipe("plastic", &[], Matched, Burley),
+        recipe("polished plastic", &[(P::Roughness, 0.1)], Remapped, Burley),
+        recipe("rough", &[(P::Roughness, 1.0), (P::Specular, 1.0)], Matched, LambertFresnel),
+        recipe("metal", &[(P::Metallic, 1.0), (P::Roughness, 0.3)], Matched, Burley),
+        recipe("brushed metal", &brushed, Remapped, Burley),
+        recipe("mirror-like metal", &[(P::Metallic, 1.0), (P::Roughness, 0.0)], Matched, Burley),
+        recipe("cloth", &[(P::Sheen, 1.0), (P::Roughness, 0.9), (P::Specular, 0.0)], Matched, Lambert),
+        recipe("wax", &[(P::Subsurface, 1.0), (P::Roughness, 0.6)], Matched, Burley),
+        recipe("half wax", &half_wax, Remapped, LambertFresnel),
+        recipe("car paint", &[(P::Metallic, 0.5), (P::Clearcoat, 1.0)], Matched, Burley),
+        recipe("satin coat", &satin, Remapped, Burley),
+        recipe("everything", &everything, Remapped, Burley),
+    ]
+}
+
+fn recipe(name: &str, scalars: &[(Parameter, f32)], masking: Masking, diffuse: DiffuseModel) -> Twin {
+    let mut params = Params { base_color: Rgb::new(0.7, 0.3, 0.1), ..Params::default() };
+    for (parameter, value) in scalars {
+        *params.get_mut(*parameter) = *value;
+    }
+    Twin::disney(name, &params, masking, diffuse)
+}
+
+/// Views from the normal to grazing, off the axes of anisotropy.
+fn views() -> [V3<f32>; 4] {
+    [1.0, 0.6, 0.2, 0.02].map(|z: f32| {
+        let r = (1.0 - z * z).sqrt();
+        V3::new(r * Real::cos(0.5), r * Real::sin(0.5), z)
+    })
+}
