@@ -1,1 +1,3 @@
-//! Sweep manifests: parsed with positions, expanded into jobs, checked against a scene.
+//! Sweep manifests.
+mod nearest;
+pub mod edit;
