@@ -94,6 +94,18 @@ pub fn apply(
     apply_all(scene, settings, &[Override { path: path.to_owned(), value: value.clone() }], load_image)
 }
 
+/// Sets a path of the render's settings, `render.FIELD`, for which no scene is needed.
+///
+/// # Errors
+/// If it is not such a path, or does not take the value.
+pub fn set_render(settings: &mut RenderSettings, path: &str, value: &Value) -> Result<(), EditError> {
+    let target = Target::parse(path)?;
+    let Target::Render(field) = target else {
+        return Err(EditError::Incomplete { path: path.to_owned(), form: "render.FIELD" });
+    };
+    render::set(settings, field, value).map_err(|Mismatch| mismatch(path, value, &target))
+}
+
 /// Sets all paths in order: the later of two values for one path stays.
 ///
 /// Fields of the camera are gathered and applied together at the end, to the camera that the settings then name: position,
