@@ -1,8 +1,18 @@
 //! Source materials into Disney materials, with a note on every field: exact, carried, approximated or dropped.
 
+mod gltf;
+
+use crate::disney::{DiffuseModel, Model};
 use crate::record::Warning;
 use crate::scene::source::SourceMaterial;
-use crate::scene::{Material, Scene};
+use crate::scene::{Material, Named, Scene};
+
+/// What a conversion leaves to its caller.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ConvertOptions {
+    /// The diffuse term of all Disney materials; each dialect has its own where absent ([`DiffuseModel::Burley`] for glTF).
+    pub diffuse: Option<DiffuseModel>,
+}
 
 /// A converted scene and what the conversion has to say.
 #[derive(Clone, Debug)]
@@ -39,4 +49,50 @@ pub enum Quality {
     Approximated,
     /// Not at all.
     Dropped,
+}
+
+/// `scene` with its materials as Disney materials, and what became of each of their fields. It can't fail: importers have seen to
+/// the ranges.
+pub fn to_disney(scene: Scene<SourceMaterial>, options: &ConvertOptions) -> Converted {
+    let (mut notes, mut warnings) = (Vec::new(), Vec::new());
+    let scene = scene.map_materials(|Named { name, item }| {
+        let mut material = match &item {
+            SourceMaterial::Gltf(source) => {
+                let diffuse = options.diffuse.unwrap_or_default();
+                gltf::convert(&name, source, diffuse, &mut notes, &mut warnings)
+            }
+            // MERGE: `mtl::convert(&name, source, &mut notes, &mut warnings)` and the same for `aris`.
+            SourceMaterial::Mtl(_) | SourceMaterial::Aris(_) => {
+                warnings.push(Warning::new(
+                    format!("material {name:?}"),
+                    "materials of this kind are not converted by this build; it has the defaults",
+                ));
+                Material::default()
+            }
+        };
+        if let (Model::Disney, Some(diffuse)) = (material.model, options.diffuse) {
+            material.diffuse = diffuse;
+        }
+        Named { name, item: material }
+    });
+    Converted { scene, notes, warnings }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::source::GltfMaterial;
+
+    #[test]
+    fn the_diffuse_term_is_the_callers() {
+        let mut scene = Scene::empty();
+        let source = SourceMaterial::Gltf(GltfMaterial::default());
+        scene.materials.push(Named::new("ball", source));
+        let with = |diffuse| to_disney(scene.clone(), &ConvertOptions { diffuse });
+        assert_eq!(with(None).scene.materials[0].item.diffuse, DiffuseModel::Burley);
+        let converted = with(Some(DiffuseModel::LambertFresnel));
+        assert_eq!(converted.scene.materials[0].item.diffuse, DiffuseModel::LambertFresnel);
+        assert_eq!(converted.scene.materials[0].name, "ball");
+        assert!(converted.notes.iter().all(|n| n.quality == Quality::Exact && n.material == "ball"));
+    }
 }

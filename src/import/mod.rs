@@ -1,15 +1,28 @@
 //! Files into scenes: glTF, OBJ and Aris, each in a room of its own.
 //!
 //! An importer reads files through [`Files`], which keeps it inside the scene's folder and counts what it read, and returns an
-//! [`Imported`]: the scene with its dialect's own materials, and what was noticed on the way.
+//! [`Imported`]: the scene with its dialect's own materials, and what was noticed on the way. What all dialects owe the renderer
+//! (finite positions, indices in range, unique names) is seen to here, once, after the dialect is done.
 
 mod files;
+mod gltf;
+mod images;
+mod validate;
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 pub use files::{FileDigest, FileError, Files};
+pub use gltf::{GltfError, UriProblem};
+pub use images::ImageError;
+pub use validate::InvalidScene;
 
 use crate::record::Warning;
 use crate::scene::Scene;
 use crate::scene::source::SourceMaterial;
+
+/// The most that a `.gz` may unpack to, in bytes.
+const MAX_UNPACKED: u64 = 4 << 30;
 
 /// A scene as its file describes it.
 #[derive(Clone, Debug)]
@@ -20,4 +33,194 @@ pub struct Imported {
     pub warnings: Vec<Warning>,
     /// Every file that was read, in order: the scene's identity.
     pub files: Vec<FileDigest>,
+}
+
+/// What an import leaves to its caller.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImportOptions {
+    /// The unit that the intensities of glTF's punctual lights are read in.
+    pub light_units: LightUnits,
+}
+
+/// The unit of glTF's punctual lights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightUnits {
+    /// Candela and lux as they are, beside emission in nits: all keep their ratio.
+    #[default]
+    Photometric,
+    /// Divided by 683 lm/W, as Blender's importer does.
+    Blender,
+}
+
+/// Why a scene could not be imported.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The file's name has an ending that no importer reads.
+    #[error("{}: no importer for this kind of file; known are .gltf, .glb, .obj, .yaml and .yml, each also with .gz", path.display())]
+    UnknownExtension {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The scene's name isn't text.
+    #[error("{}: the file's name is not valid Unicode", path.display())]
+    Name {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The scene's file can't be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A `.gz` that is damaged.
+    #[error("{} cannot be unpacked: {cause}", path.display())]
+    Unpack {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's reason.
+        cause: std::io::Error,
+    },
+    /// A `.gz` that unpacks to more than any scene needs.
+    #[error("{} unpacks to more than {MAX_UNPACKED} bytes", path.display())]
+    UnpackedTooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A glTF file that can't be imported.
+    #[error("{}: {cause}", path.display())]
+    Gltf {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: Box<GltfError>,
+    },
+    /// A kind of file whose importer is not in this build.
+    #[error("{}: {dialect} files are not read by this build", path.display())]
+    Unavailable {
+        /// The file.
+        path: PathBuf,
+        /// The kind.
+        dialect: &'static str,
+    },
+    /// A scene that was read but can't be rendered.
+    #[error("{}: {cause}", path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: InvalidScene,
+    },
+}
+
+/// The scene in the file `path`, a `.gltf`, `.glb`, `.obj`, `.yaml` or `.yml`, or one of these packed as `.gz`.
+///
+/// Positions of the result are finite, indices in range, triangles not degenerate, normals of unit length and names unique;
+/// what had to be mended is in the warnings. Every vertex belongs to a triangle, and every instance has triangles.
+///
+/// # Errors
+/// If the file or one that it names can't be read, isn't what it claims to be, needs an extension that is not read, has values
+/// out of range, or leaves nothing to render.
+pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
+    let name = path.file_name().unwrap_or_default();
+    let name = name.to_str().ok_or_else(|| ImportError::Name { path: path.to_owned() })?;
+    let dialect =
+        Dialect::of(name).ok_or_else(|| ImportError::UnknownExtension { path: path.to_owned() })?;
+    let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
+    let (mut scene, mut warnings) = match dialect {
+        Dialect::Gltf => {
+            let bytes = read_scene(&mut files, path, name)?;
+            gltf::import(&mut files, name, &bytes, options)
+                .map_err(|cause| ImportError::Gltf { path: path.to_owned(), cause: Box::new(cause) })?
+        }
+        // MERGE: `obj::import(&mut files, name, &bytes)` goes here.
+        Dialect::Obj => return Err(ImportError::Unavailable { path: path.to_owned(), dialect: "OBJ" }),
+        // MERGE: `aris::import(path)` goes here; it makes its own `Files`.
+        Dialect::Aris => return Err(ImportError::Unavailable { path: path.to_owned(), dialect: "Aris" }),
+    };
+    validate::validate(&mut scene, name, &mut warnings)
+        .map_err(|cause| ImportError::Invalid { path: path.to_owned(), cause })?;
+    Ok(Imported { scene, warnings, files: files.into_digests() })
+}
+
+/// The kinds of files that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Dialect {
+    Gltf,
+    Obj,
+    Aris,
+}
+
+impl Dialect {
+    /// The kind of the file called `name`, by its ending.
+    fn of(name: &str) -> Option<Self> {
+        let name = name.to_ascii_lowercase();
+        let name = name.strip_suffix(".gz").unwrap_or(&name);
+        match name.rsplit_once('.')?.1 {
+            "gltf" | "glb" => Some(Self::Gltf),
+            "obj" => Some(Self::Obj),
+            "yaml" | "yml" => Some(Self::Aris),
+            _ => None,
+        }
+    }
+}
+
+/// The content of the scene's own file, unpacked if it is a `.gz`.
+fn read_scene(files: &mut Files, path: &Path, name: &str) -> Result<Vec<u8>, ImportError> {
+    let bytes = files.read(name)?;
+    if name.to_ascii_lowercase().ends_with(".gz") { gunzip(&bytes, path, MAX_UNPACKED) } else { Ok(bytes) }
+}
+
+/// `packed` unpacked, at most `limit` bytes.
+fn gunzip(packed: &[u8], path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
+    let mut bytes = Vec::new();
+    flate2::read::MultiGzDecoder::new(packed)
+        .take(limit.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(|cause| ImportError::Unpack { path: path.to_owned(), cause })?;
+    if bytes.len() as u64 > limit {
+        return Err(ImportError::UnpackedTooLarge { path: path.to_owned() });
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    #[test]
+    fn the_ending_chooses_the_importer() {
+        for (name, dialect) in [
+            ("a.glb", Some(Dialect::Gltf)),
+            ("a.GLTF", Some(Dialect::Gltf)),
+            ("a.b.obj.gz", Some(Dialect::Obj)),
+            ("cbox.yml", Some(Dialect::Aris)),
+            ("a.gz", None),
+            ("glb", None),
+            ("a.fbx", None),
+        ] {
+            assert_eq!(Dialect::of(name), dialect, "{name}");
+        }
+        let error = import(Path::new("some/where.fbx"), &ImportOptions::default()).unwrap_err();
+        assert!(error.to_string().contains(".glb"), "{error}");
+    }
+
+    #[test]
+    fn unpacking_is_bounded_and_damage_is_told() {
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+        packer.write_all(&[0; 100_000]).unwrap();
+        let packed = packer.finish().unwrap();
+        let path = Path::new("x.glb.gz");
+        assert_eq!(gunzip(&packed, path, 100_000).unwrap().len(), 100_000);
+        assert!(matches!(gunzip(&packed, path, 99_999), Err(ImportError::UnpackedTooLarge { .. })));
+        let half = &packed[..packed.len() / 2];
+        assert!(matches!(gunzip(half, path, 100_000), Err(ImportError::Unpack { .. })));
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = import(&folder.path().join("none.glb"), &ImportOptions::default()).unwrap_err();
+        assert!(matches!(&error, ImportError::File(FileError::Read { .. })), "{error}");
+        assert!(error.to_string().contains("none.glb"));
+    }
 }

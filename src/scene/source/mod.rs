@@ -5,7 +5,7 @@ mod gltf;
 mod mtl;
 
 pub use aris::ArisMaterial;
-pub use gltf::GltfMaterial;
+pub use gltf::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
 pub use mtl::MtlMaterial;
 
 /// A material as its file describes it.

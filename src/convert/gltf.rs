@@ -1,0 +1,497 @@
+//! glTF materials into Disney materials.
+
+use super::{Note, Quality};
+use crate::color::Rgb;
+use crate::disney::{DiffuseModel, Masking, Model, Parameter};
+use crate::math::Real;
+use crate::record::Warning;
+use crate::scene::Material;
+use crate::scene::material::{
+    Emission, NormalMap, Opacity, Param, ShadingFrame, Sides, TextureChannel, TextureMap,
+};
+use crate::scene::source::{
+    AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular,
+};
+
+/// F0 of Disney's `specular` 1: F0 = 0.08·specular.
+const F0_OF_SPECULAR: f32 = 0.08;
+/// glTF's index of refraction where KHR_materials_ior says nothing.
+const DEFAULT_IOR: f32 = 1.5;
+
+/// The Disney material of the glTF material `source` called `name`, with glTF's own diffuse term replaced by `diffuse`.
+///
+/// Disney's model with the matched G and `lambert_fresnel` is glTF's metallic-roughness model; under `burley` the parameters are
+/// carried and the diffuse term differs.
+pub(super) fn convert(
+    name: &str,
+    source: &GltfMaterial,
+    diffuse: DiffuseModel,
+    notes: &mut Vec<Note>,
+    warnings: &mut Vec<Warning>,
+) -> Material {
+    let mut notes = Notes { material: name, notes };
+    let mut material = Material {
+        masking: Masking::Matched,
+        diffuse,
+        opacity: opacity(source, &mut notes),
+        frame: ShadingFrame::Surface,
+        sides: Sides::Both,
+        vertex_color: source.vertex_color,
+        ..Material::default()
+    };
+    note_unread(source, &mut notes);
+    if source.unlit {
+        make_unlit(source, &mut material, &mut notes);
+        return material;
+    }
+
+    let (core, reason) = quality_of_core(diffuse);
+    material.base_color = colored(source.base_color_factor, source.base_color_texture.as_ref());
+    notes.add("baseColorFactor", core, reason);
+    if source.base_color_texture.is_some() {
+        notes.add("baseColorTexture", core, reason);
+    }
+    if source.vertex_color {
+        notes.add("COLOR_0", core, reason);
+    }
+    let map = source.metallic_roughness_texture.as_ref();
+    *material.scalar_mut(Parameter::Metallic) = textured(source.metallic_factor, map, TextureChannel::B);
+    *material.scalar_mut(Parameter::Roughness) = textured(source.roughness_factor, map, TextureChannel::G);
+    notes.add("metallicFactor", core, reason);
+    notes.add("roughnessFactor", core, reason);
+    if map.is_some() {
+        notes.add("metallicRoughnessTexture", core, reason);
+    }
+
+    convert_specular(source, core, reason, &mut material, &mut notes);
+    for parameter in [
+        Parameter::Subsurface,
+        Parameter::Anisotropic,
+        Parameter::Sheen,
+        Parameter::SheenTint,
+        Parameter::Clearcoat,
+    ] {
+        *material.scalar_mut(parameter) = Param::Constant(0.0);
+    }
+    *material.scalar_mut(Parameter::ClearcoatGloss) = Param::Constant(1.0);
+    if let Some(coat) = &source.clearcoat {
+        convert_clearcoat(coat, &mut material, &mut notes);
+    }
+    if let Some(sheen) = &source.sheen {
+        convert_sheen(sheen, source, &mut material, &mut notes);
+    }
+    if let Some(anisotropy) = &source.anisotropy {
+        convert_anisotropy(anisotropy, source, &mut material, &mut notes);
+    }
+    convert_emission(source, &mut material, &mut notes);
+    if let Some(map) = &source.normal_texture {
+        material.normal_map = Some(NormalMap { map: map.clone(), scale: source.normal_scale });
+        let reason = "with the mesh's tangents; without them the frame follows the texture coordinates, which is \
+                      MikkTSpace's up to its smoothing";
+        notes.add("normalTexture", Quality::Exact, reason);
+    }
+    if source.occlusion {
+        let reason = "not read: a path tracer computes what it approximates";
+        notes.add("occlusionTexture", Quality::Exact, reason);
+    }
+    if let Some(f0) = material.scalar(Parameter::Specular).constant()
+        && f0 * F0_OF_SPECULAR > 0.5
+        && source.metallic_factor < 1.0
+    {
+        let message = "a dielectric that reflects more than half of the light head-on; the Disney model adds its \
+                       diffuse term without taking that away, so its albedo exceeds 1";
+        warnings.push(Warning::new(format!("material {name:?}"), message));
+    }
+    material
+}
+
+/// The notes of one material.
+struct Notes<'a> {
+    material: &'a str,
+    notes: &'a mut Vec<Note>,
+}
+
+impl Notes<'_> {
+    fn add(&mut self, field: &str, quality: Quality, reason: &str) {
+        let (material, field) = (self.material.to_owned(), field.to_owned());
+        self.notes.push(Note { material, field, quality, reason: reason.to_owned() });
+    }
+}
+
+/// How well the core model is kept under a diffuse term.
+fn quality_of_core(diffuse: DiffuseModel) -> (Quality, &'static str) {
+    match diffuse {
+        DiffuseModel::LambertFresnel => (Quality::Exact, ""),
+        DiffuseModel::Burley => (
+            Quality::Carried,
+            "Burley's diffuse term for Lambert times 1 - F: albedo of a white dielectric +5% (roughness 0.5, 0°), +8% \
+             (roughness 1, 0°), +24% (75°), +47% (85°)",
+        ),
+        DiffuseModel::Lambert => {
+            (Quality::Carried, "Lambert without 1 - F: the diffuse term keeps the light that the highlight reflects")
+        }
+    }
+}
+
+fn colored(factor: Rgb, map: Option<&TextureMap>) -> Param<Rgb> {
+    match map {
+        Some(map) => Param::Texture { map: map.clone(), factor },
+        None => Param::Constant(factor),
+    }
+}
+
+fn textured(factor: f32, map: Option<&TextureMap>, channel: TextureChannel) -> Param<f32> {
+    match map {
+        Some(map) => Param::Texture { map: TextureMap { channel, ..map.clone() }, factor },
+        None => Param::Constant(factor),
+    }
+}
+
+/// OPAQUE, MASK and BLEND as coverage.
+fn opacity(source: &GltfMaterial, notes: &mut Notes) -> Opacity {
+    let alpha = textured(source.alpha_factor, source.base_color_texture.as_ref(), TextureChannel::A);
+    match source.alpha_mode {
+        AlphaMode::Opaque => Opacity::default(),
+        AlphaMode::Mask { cutoff } => {
+            notes.add("alphaMode", Quality::Exact, "MASK");
+            Opacity { alpha, cutoff: Some(cutoff) }
+        }
+        AlphaMode::Blend => {
+            notes.add("alphaMode", Quality::Exact, "BLEND: alpha as coverage");
+            Opacity { alpha, cutoff: None }
+        }
+    }
+}
+
+fn note_unread(source: &GltfMaterial, notes: &mut Notes) {
+    for name in &source.unread {
+        notes.add(name, Quality::Dropped, "not read");
+    }
+}
+
+/// The sides that light leaves: back faces of single-sided materials aren't there for glTF.
+fn emitting_sides(source: &GltfMaterial) -> Sides {
+    if source.double_sided { Sides::Both } else { Sides::Front }
+}
+
+fn convert_emission(source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
+    let color = colored(source.emissive_factor, source.emissive_texture.as_ref());
+    material.emission =
+        Emission { color, strength: source.emissive_strength, sides: emitting_sides(source) };
+    if material.emits() {
+        notes.add("emissiveFactor", Quality::Exact, "");
+        if source.emissive_texture.is_some() {
+            notes.add("emissiveTexture", Quality::Exact, "");
+        }
+        if source.emissive_strength != 1.0 {
+            notes.add("KHR_materials_emissive_strength", Quality::Exact, "");
+        }
+    }
+}
+
+/// KHR_materials_unlit: the base colour as emission, no reflection.
+fn make_unlit(source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
+    material.model = Model::Diffuse;
+    material.base_color = Param::Constant(Rgb::BLACK);
+    material.vertex_color = source.vertex_color;
+    material.emission = Emission {
+        color: colored(source.base_color_factor, source.base_color_texture.as_ref()),
+        strength: 1.0,
+        sides: Sides::Both,
+    };
+    let reason = "the base colour as emission, which also lights other surfaces";
+    notes.add("KHR_materials_unlit", Quality::Approximated, reason);
+    if source.vertex_color {
+        let reason = "vertex colours don't multiply emission";
+        notes.add("COLOR_0", Quality::Dropped, reason);
+    }
+}
+
+/// F0 of a smooth interface to air: ((n-1)/(n+1))²; glTF's ior 0 stands for F = 1 everywhere.
+fn f0_of_ior(ior: f32) -> f32 {
+    if ior == 0.0 { 1.0 } else { Real::sqr((ior - 1.0) / (ior + 1.0)) }
+}
+
+/// KHR_materials_ior and KHR_materials_specular: F0 = min(F0(ior)·color, 1)·factor as specular and specular_tint.
+fn convert_specular(
+    source: &GltfMaterial,
+    core: Quality,
+    reason: &str,
+    material: &mut Material,
+    notes: &mut Notes,
+) {
+    let f0_ior = f0_of_ior(source.ior.unwrap_or(DEFAULT_IOR));
+    let extension = source.specular.unwrap_or(GltfSpecular { factor: 1.0, color: Rgb::WHITE });
+    let f0 = extension.color.map(|c| (f0_ior * c).min(1.0) * extension.factor);
+    let tint = fit_tint(f0, source.base_color_factor);
+    // Rounding may lift the luminance of white above 1.
+    let specular = (disney_luminance(f0) / F0_OF_SPECULAR).min(Parameter::Specular.max());
+    *material.scalar_mut(Parameter::Specular) = Param::Constant(specular);
+    *material.scalar_mut(Parameter::SpecularTint) = Param::Constant(tint.amount);
+    match source.ior {
+        Some(0.0) => {
+            let reason = "0 means a reflectance of 1 at all angles: F0 is 1, but the diffuse term stays";
+            notes.add("KHR_materials_ior", Quality::Approximated, reason);
+        }
+        Some(ior) if core == Quality::Carried && ior > 1.5 => {
+            let reason = format!("{reason}; more with a higher ior: +9% at 1.8, +17% at 2.42 under burley");
+            notes.add("KHR_materials_ior", core, &reason);
+        }
+        Some(_) => notes.add("KHR_materials_ior", core, reason),
+        None => {}
+    }
+    if source.specular.is_some() {
+        let mut reason = format!("luminance of F0 exact, hue: {}", tint.describe());
+        if extension.factor != 1.0 {
+            reason.push_str("; the factor doesn't lower the reflectance at grazing angles (f90)");
+        }
+        notes.add("KHR_materials_specular", Quality::Approximated, &reason);
+    }
+}
+
+/// KHR_materials_clearcoat: Disney's coat is 0.25·clearcoat·GTR1 with F0 0.04, so factor 1 is clearcoat 4.
+fn convert_clearcoat(coat: &GltfClearcoat, material: &mut Material, notes: &mut Notes) {
+    *material.scalar_mut(Parameter::Clearcoat) =
+        textured(4.0 * coat.factor, coat.texture.as_ref(), TextureChannel::R);
+    // Disney's alpha is lerp(0.1, 0.001, gloss), glTF's roughness².
+    let gloss = ((0.1 - coat.roughness * coat.roughness) / 0.099).clamp(0.0, 1.0);
+    *material.scalar_mut(Parameter::ClearcoatGloss) = Param::Constant(gloss);
+    let mut reason =
+        "clearcoat = 4·factor; GTR1 for GGX, and the base is not darkened under the coat".to_owned();
+    // lerp(0.1, 0.001, 0) is the roughest coat there is.
+    if coat.roughness * coat.roughness > 0.1 {
+        reason.push_str("; the coat's alpha ends at 0.1");
+    }
+    notes.add("KHR_materials_clearcoat", Quality::Approximated, &reason);
+}
+
+/// KHR_materials_sheen: colour as sheen and sheen_tint.
+fn convert_sheen(sheen: &GltfSheen, source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
+    let tint = fit_tint(sheen.color, source.base_color_factor);
+    *material.scalar_mut(Parameter::Sheen) = Param::Constant(disney_luminance(sheen.color).min(1.0));
+    *material.scalar_mut(Parameter::SheenTint) = Param::Constant(tint.amount);
+    let reason = format!(
+        "no roughness; Charlie's lobe is 6 to 26 times brighter than Disney's at an equal factor; hue: {}",
+        tint.describe()
+    );
+    notes.add("KHR_materials_sheen", Quality::Approximated, &reason);
+}
+
+/// KHR_materials_anisotropy: with a = roughness² along the bitangent and t = a + (1-a)·strength² along the tangent, Disney's
+/// alphas roughness²/aspect and roughness²·aspect are t and a for roughness = (t·a)^¼ and anisotropic = (1 - a/t)/0.9.
+fn convert_anisotropy(
+    anisotropy: &GltfAnisotropy,
+    source: &GltfMaterial,
+    material: &mut Material,
+    notes: &mut Notes,
+) {
+    let a = Real::sqr(source.roughness_factor);
+    let t = a + (1.0 - a) * Real::sqr(anisotropy.strength);
+    let ratio = if t > 0.0 { a / t } else { 1.0 };
+    let anisotropic = (1.0 - ratio) / 0.9;
+    *material.scalar_mut(Parameter::Anisotropic) = Param::Constant(anisotropic.min(1.0));
+    material.rotation = anisotropy.rotation;
+    let (quality, reason) = if source.metallic_roughness_texture.is_some() {
+        // The formula doesn't factor into a texture and a constant.
+        (Quality::Approximated, "the aspect is that of roughnessFactor; the texture's roughness is kept as it is")
+    } else {
+        *material.scalar_mut(Parameter::Roughness) = Param::Constant((t * a).sqrt().sqrt());
+        match anisotropic <= 1.0 {
+            true => (Quality::Exact, ""),
+            false => (Quality::Approximated, "the ratio of the two alphas is more than Disney's 10 and ends there"),
+        }
+    };
+    notes.add("KHR_materials_anisotropy", quality, reason);
+}
+
+/// The luminance that Disney's tint divides by: 0.3 R + 0.6 G + 0.1 B (disney.brdf).
+fn disney_luminance(c: Rgb) -> f32 {
+    0.3 * c.r + 0.6 * c.g + 0.1 * c.b
+}
+
+/// A tint towards the base colour's hue that comes as near as it can to a colour.
+struct Tint {
+    /// specular_tint or sheen_tint, in [0, 1].
+    amount: f32,
+    /// The largest difference of a channel that stays, as a fraction of the luminance.
+    error: f32,
+    /// Whether the base colour has no hue to tint with.
+    grey_base: bool,
+}
+
+impl Tint {
+    fn describe(&self) -> String {
+        match (self.error < 5e-4, self.grey_base) {
+            (true, _) => "exact".into(),
+            (false, true) => format!("lost, since the base colour has none (off by {:.0}%)", 100.0 * self.error),
+            (false, false) => format!("tinted by the base colour, off by {:.0}%", 100.0 * self.error),
+        }
+    }
+}
+
+/// The t in [0, 1] for which lerp(1, base/lum(base), t) is nearest to color/lum(color), by least squares.
+fn fit_tint(color: Rgb, base: Rgb) -> Tint {
+    let chroma = |c: Rgb| {
+        let l = disney_luminance(c);
+        if l > 0.0 { c * (1.0 / l) - Rgb::WHITE } else { Rgb::BLACK }
+    };
+    let dot = |a: Rgb, b: Rgb| a.r * b.r + a.g * b.g + a.b * b.b;
+    let (wanted, hue) = (chroma(color), chroma(base));
+    let length = dot(hue, hue);
+    let grey_base = length < 1e-8;
+    let amount = if grey_base { 0.0 } else { (dot(wanted, hue) / length).clamp(0.0, 1.0) };
+    let error = (wanted - hue * amount).map(f32::abs).max_channel();
+    Tint { amount, error, grey_base }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::TextureId;
+
+    fn run(source: &GltfMaterial) -> (Material, Vec<Note>) {
+        let (mut notes, mut warnings) = (Vec::new(), Vec::new());
+        let material = convert("m", source, DiffuseModel::Burley, &mut notes, &mut warnings);
+        (material, notes)
+    }
+
+    fn scalar(material: &Material, parameter: Parameter) -> f32 {
+        material.scalar(parameter).constant().unwrap()
+    }
+
+    fn quality(notes: &[Note], field: &str) -> Quality {
+        notes.iter().find(|n| n.field == field).unwrap().quality
+    }
+
+    #[test]
+    fn the_core_maps_one_to_one() {
+        let map = TextureMap::new(TextureId(3), TextureChannel::R);
+        let source = GltfMaterial {
+            base_color_factor: Rgb::new(0.1, 0.2, 0.3),
+            metallic_factor: 0.25,
+            roughness_factor: 0.75,
+            metallic_roughness_texture: Some(map.clone()),
+            ..GltfMaterial::default()
+        };
+        let (material, notes) = run(&source);
+        assert_eq!(material.base_color, Param::Constant(Rgb::new(0.1, 0.2, 0.3)));
+        let read = |channel, factor| Param::Texture { map: TextureMap { channel, ..map.clone() }, factor };
+        assert_eq!(*material.scalar(Parameter::Metallic), read(TextureChannel::B, 0.25));
+        assert_eq!(*material.scalar(Parameter::Roughness), read(TextureChannel::G, 0.75));
+        assert!((scalar(&material, Parameter::Specular) - 0.5).abs() < 1e-6, "F0 is 0.04");
+        assert_eq!(scalar(&material, Parameter::SheenTint), 0.0);
+        assert_eq!(quality(&notes, "baseColorFactor"), Quality::Carried);
+        let mut notes = Vec::new();
+        convert("m", &source, DiffuseModel::LambertFresnel, &mut notes, &mut Vec::new());
+        assert_eq!(quality(&notes, "baseColorFactor"), Quality::Exact);
+    }
+
+    #[test]
+    fn alpha_modes_become_coverage() {
+        let with = |alpha_mode| {
+            let source = GltfMaterial { alpha_mode, alpha_factor: 0.25, ..GltfMaterial::default() };
+            run(&source).0.opacity
+        };
+        assert_eq!(with(AlphaMode::Opaque), Opacity::default());
+        let alpha = Param::Constant(0.25);
+        assert_eq!(with(AlphaMode::Blend), Opacity { alpha: alpha.clone(), cutoff: None });
+        assert_eq!(with(AlphaMode::Mask { cutoff: 0.5 }), Opacity { alpha, cutoff: Some(0.5) });
+    }
+
+    #[test]
+    fn emission_leaves_both_sides_only_if_double_sided() {
+        let source = GltfMaterial {
+            emissive_factor: Rgb::grey(0.5),
+            emissive_strength: 4.0,
+            ..GltfMaterial::default()
+        };
+        let emission = run(&source).0.emission;
+        let expected =
+            Emission { color: Param::Constant(Rgb::grey(0.5)), strength: 4.0, sides: Sides::Front };
+        assert_eq!(emission, expected);
+        let both = run(&GltfMaterial { double_sided: true, ..source }).0;
+        assert_eq!((both.emission.sides, both.sides), (Sides::Both, Sides::Both));
+    }
+
+    #[test]
+    fn ior_becomes_specular() {
+        let specular = |ior| {
+            let (material, notes) = run(&GltfMaterial { ior: Some(ior), ..GltfMaterial::default() });
+            (scalar(&material, Parameter::Specular), quality(&notes, "KHR_materials_ior"))
+        };
+        assert!((specular(1.79).0 - 1.0).abs() < 3e-3);
+        assert!((specular(2.42).0 - 2.155).abs() < 1e-3, "diamond");
+        assert_eq!(specular(1.0), (0.0, Quality::Carried));
+        assert_eq!(specular(0.0), (12.5, Quality::Approximated));
+    }
+
+    #[test]
+    fn a_specular_colour_of_the_bases_hue_is_kept() {
+        let base = Rgb::new(0.8, 0.4, 0.2);
+        let source = |color| GltfMaterial {
+            base_color_factor: base,
+            specular: Some(GltfSpecular { factor: 0.5, color }),
+            ..GltfMaterial::default()
+        };
+        let (material, notes) = run(&source(base));
+        assert!((scalar(&material, Parameter::SpecularTint) - 1.0).abs() < 1e-6);
+        let f0 = 0.04 * 0.5 * disney_luminance(base);
+        assert!((scalar(&material, Parameter::Specular) - f0 / 0.08).abs() < 1e-6);
+        let note = notes.iter().find(|n| n.field == "KHR_materials_specular").unwrap();
+        assert!(note.reason.contains("hue: exact"), "{}", note.reason);
+        let (material, notes) = run(&source(Rgb::new(0.2, 0.4, 0.8)));
+        assert_eq!(scalar(&material, Parameter::SpecularTint), 0.0, "the opposite hue");
+        let note = notes.iter().find(|n| n.field == "KHR_materials_specular").unwrap();
+        assert!(note.reason.contains("off by"), "{}", note.reason);
+    }
+
+    #[test]
+    fn a_coat_of_factor_1_is_four_times_disneys() {
+        let coat = |roughness| GltfClearcoat { factor: 1.0, texture: None, roughness };
+        let with = |roughness| {
+            run(&GltfMaterial { clearcoat: Some(coat(roughness)), ..GltfMaterial::default() }).0
+        };
+        assert_eq!(scalar(&with(0.0), Parameter::Clearcoat), 4.0);
+        assert_eq!(scalar(&with(0.0), Parameter::ClearcoatGloss), 1.0);
+        assert_eq!(scalar(&with(1.0), Parameter::ClearcoatGloss), 0.0);
+        let gloss = scalar(&with(0.2), Parameter::ClearcoatGloss);
+        assert!((0.1 * (1.0 - gloss) + 0.001 * gloss - 0.04).abs() < 1e-6, "alpha is roughness²");
+    }
+
+    #[test]
+    fn anisotropy_gives_gltfs_two_alphas() {
+        for (roughness, strength) in [(0.8f32, 0.5f32), (0.5, 0.6), (1.0, 1.0), (0.7, 0.0)] {
+            let anisotropy = Some(GltfAnisotropy { strength, rotation: 0.3 });
+            let source =
+                GltfMaterial { roughness_factor: roughness, anisotropy, ..GltfMaterial::default() };
+            let (material, notes) = run(&source);
+            // The parametrisation of disney.brdf.
+            let aspect = (1.0 - 0.9 * scalar(&material, Parameter::Anisotropic)).sqrt();
+            let r2 = Real::sqr(scalar(&material, Parameter::Roughness));
+            let a = roughness * roughness;
+            let t = a + (1.0 - a) * strength * strength;
+            assert!((r2 / aspect - t).abs() < 1e-5, "along the tangent");
+            assert!((r2 * aspect - a).abs() < 1e-5, "along the bitangent");
+            assert_eq!(material.rotation, 0.3);
+            assert_eq!(quality(&notes, "KHR_materials_anisotropy"), Quality::Exact);
+        }
+        let anisotropy = Some(GltfAnisotropy { strength: 1.0, rotation: 0.0 });
+        let (material, notes) =
+            run(&GltfMaterial { roughness_factor: 0.0, anisotropy, ..GltfMaterial::default() });
+        assert_eq!(scalar(&material, Parameter::Anisotropic), 1.0);
+        assert_eq!(quality(&notes, "KHR_materials_anisotropy"), Quality::Approximated);
+    }
+
+    #[test]
+    fn what_is_not_read_is_dropped_aloud() {
+        let source = GltfMaterial {
+            unread: vec!["KHR_materials_iridescence".into()],
+            unlit: true,
+            ..GltfMaterial::default()
+        };
+        let (material, notes) = run(&source);
+        assert_eq!(quality(&notes, "KHR_materials_iridescence"), Quality::Dropped);
+        assert_eq!(material.model, Model::Diffuse);
+        assert_eq!(material.emission.color, Param::Constant(Rgb::WHITE));
+    }
+}

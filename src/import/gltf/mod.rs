@@ -1,0 +1,245 @@
+//! glTF 2.0: `.gltf` and `.glb`.
+//!
+//! Of the `gltf` crate only the JSON types are used. Its validation rejects files that it could read and its accessor readers
+//! panic on malformed ones, so the container, the accessors and every reference are checked here; nothing in this room indexes
+//! by a number from the file without looking first.
+//!
+//! `container` opens the file, `buffers` and `uri` find the bytes, `accessor` reads them, `geometry`, `texture`, `material` and
+//! `nodes` make the parts of the scene, and this file puts them together.
+
+mod accessor;
+mod buffers;
+mod container;
+mod error;
+mod geometry;
+mod material;
+mod nodes;
+mod texture;
+mod uri;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use glam::Affine3A;
+use gltf::json::Root;
+use gltf::json::mesh::Semantic;
+
+pub use error::{GltfError, UriProblem};
+
+use self::accessor::Accessors;
+use self::buffers::{Buffers, lookup};
+use self::geometry::{Geometry, VertexAlpha};
+use self::nodes::Placed;
+use self::texture::Textures;
+use crate::import::{Files, ImportOptions};
+use crate::record::Warning;
+use crate::scene::source::{AlphaMode, GltfMaterial, SourceMaterial};
+use crate::scene::{Instance, MaterialId, Mesh, MeshId, Named, Scene};
+
+/// The most instances that a scene may have.
+const MAX_INSTANCES: u64 = 1 << 24;
+
+/// The scene in `bytes`, the content of the file called `name`, with what was noticed.
+pub(super) fn import(
+    files: &mut Files,
+    name: &str,
+    bytes: &[u8],
+    options: &ImportOptions,
+) -> Result<(Scene<SourceMaterial>, Vec<Warning>), GltfError> {
+    let document = container::open(bytes)?;
+    let root = &document.root;
+    let mut warnings = unread_extensions(root, name);
+    let buffers = Buffers::load(&document, files)?;
+    let placed = nodes::place(root, name, &mut warnings)?;
+
+    let mut scene = Scene::empty();
+    let mut textures = Textures::new(root, &buffers, files);
+    let materials = read_materials(root, &mut textures)?;
+    (scene.textures, scene.images) = textures.finish();
+
+    let geometry = Geometry::new(Accessors::new(root, &buffers), name);
+    let mut stage = Stage {
+        root,
+        file: name,
+        geometry,
+        meshes: vec![None; root.meshes.len()],
+        materials,
+        default_material: None,
+        scene,
+        warnings,
+    };
+    for placed in &placed {
+        stage.place(placed, options)?;
+    }
+    let Stage { mut scene, materials, mut warnings, .. } = stage;
+    scene.materials =
+        materials.into_iter().map(|m| Named::new(m.name, SourceMaterial::Gltf(m.item))).collect();
+    missing_coordinates(&scene, name, &mut warnings);
+    Ok((scene, warnings))
+}
+
+/// A warning for each extension that the file uses without requiring it and that is not read. Conversion tells about materials'.
+fn unread_extensions(root: &Root, file: &str) -> Vec<Warning> {
+    let used: BTreeSet<&str> = root.extensions_used.iter().map(String::as_str).collect();
+    let of_materials = |e: &str| e.starts_with("KHR_materials_") && e != "KHR_materials_variants";
+    used.into_iter()
+        .filter(|e| !container::EXTENSIONS.contains(e) && !of_materials(e))
+        .map(|e| Warning::new(file, format!("the extension {e} is not read; what it adds is missing")))
+        .collect()
+}
+
+/// All materials of the file, named by index where they have no name.
+fn read_materials(root: &Root, textures: &mut Textures) -> Result<Vec<Named<GltfMaterial>>, GltfError> {
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let colored: BTreeSet<usize> = primitives
+        .filter(|p| geometry::attribute(p, Semantic::Colors(0)).is_some())
+        .filter_map(|p| p.material.map(|m| m.value()))
+        .collect();
+    let read = |(index, json): (usize, &gltf::json::Material)| {
+        let name = json.name.clone().unwrap_or_else(|| format!("material_{index}"));
+        let material = material::read(json, &name, index, colored.contains(&index), textures)?;
+        Ok(Named::new(name, material))
+    };
+    root.materials.iter().enumerate().map(read).collect()
+}
+
+/// The scene as it is put together.
+struct Stage<'a> {
+    root: &'a Root,
+    file: &'a str,
+    geometry: Geometry<'a>,
+    /// What became of each mesh of the file: its primitives' meshes and materials.
+    meshes: Vec<Option<Vec<(MeshId, MaterialId)>>>,
+    materials: Vec<Named<GltfMaterial>>,
+    default_material: Option<MaterialId>,
+    scene: Scene<SourceMaterial>,
+    warnings: Vec<Warning>,
+}
+
+impl Stage<'_> {
+    /// Puts what `placed` carries into the scene.
+    fn place(&mut self, placed: &Placed, options: &ImportOptions) -> Result<(), GltfError> {
+        let element = format!("nodes[{}]", placed.index);
+        if let Some(mesh) = placed.node.mesh {
+            self.place_mesh(mesh.value(), placed, &element)?;
+        }
+        if let Some(index) = placed.node.camera {
+            let json = lookup(&self.root.cameras, index.value(), &element, "cameras")?;
+            let camera = nodes::camera(json, index.value(), placed)?;
+            let name = placed.node.name.clone().or_else(|| json.name.clone());
+            let name = name.unwrap_or_else(|| format!("camera_{}", self.scene.cameras.len()));
+            self.scene.cameras.push(Named::new(name, camera));
+        }
+        let extension = placed.node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        if let Some(extension) = extension {
+            let lights =
+                self.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map(|e| &e.lights);
+            let index = extension.light.value();
+            let json = lookup(lights.map_or(&[][..], Vec::as_slice), index, &element, "lights")?;
+            let light = nodes::light(json, index, placed, options)?;
+            let name = placed.node.name.clone().or_else(|| json.name.clone());
+            let name = name.unwrap_or_else(|| format!("light_{}", self.scene.lights.len()));
+            self.scene.lights.push(Named::new(name, light));
+        }
+        Ok(())
+    }
+
+    fn place_mesh(&mut self, index: usize, placed: &Placed, element: &str) -> Result<(), GltfError> {
+        let m = placed.world_from_node;
+        if m.matrix3.determinant() == 0.0 {
+            let message = "its transform has no inverse (a scale of 0); its mesh is left out";
+            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
+            return Ok(());
+        }
+        if placed.node.skin.is_some() {
+            let message = "skins are not applied: the mesh is shown as it was bound, where the node stands";
+            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
+        }
+        let world_from_object =
+            Affine3A::from_cols_array(&m.to_cols_array().map(|v| v as f32));
+        let parts = self.read_mesh(index, element)?;
+        if self.scene.instances.len() as u64 + parts.len() as u64 > MAX_INSTANCES {
+            return Err(GltfError::TooMany { what: "instances", limit: MAX_INSTANCES });
+        }
+        for (mesh, material) in parts {
+            self.scene.instances.push(Instance { name: placed.name(), mesh, material, world_from_object });
+        }
+        Ok(())
+    }
+
+    /// The meshes and materials of `meshes[index]`, read when it is first asked for.
+    fn read_mesh(
+        &mut self,
+        index: usize,
+        element: &str,
+    ) -> Result<Vec<(MeshId, MaterialId)>, GltfError> {
+        let json = lookup(&self.root.meshes, index, element, "meshes")?;
+        if let Some(parts) = &self.meshes[index] {
+            return Ok(parts.clone());
+        }
+        let mesh_name = json.name.clone().unwrap_or_else(|| format!("mesh_{index}"));
+        let mut parts = Vec::new();
+        for (i, primitive) in json.primitives.iter().enumerate() {
+            let element = format!("meshes[{index}].primitives[{i}]");
+            let name = if json.primitives.len() == 1 { mesh_name.clone() } else { format!("{mesh_name}/{i}") };
+            let colored = geometry::attribute(primitive, Semantic::Colors(0)).is_some();
+            let material = self.material_of(primitive.material.map(|m| m.value()), colored, &element)?;
+            let alpha = match self.materials[material.0 as usize].item.alpha_mode {
+                AlphaMode::Opaque => VertexAlpha::Ignore,
+                AlphaMode::Mask { .. } | AlphaMode::Blend => VertexAlpha::Keep,
+            };
+            let mesh = self.geometry.read(primitive, &element, name, alpha, &mut self.warnings)?;
+            if let Some(mesh) = mesh {
+                let id = MeshId(self.scene.meshes.len() as u32);
+                self.scene.meshes.push(mesh);
+                parts.push((id, material));
+            }
+        }
+        self.meshes[index] = Some(parts.clone());
+        Ok(parts)
+    }
+
+    /// The material that a primitive names, or the specification's default one.
+    fn material_of(
+        &mut self,
+        index: Option<usize>,
+        colored: bool,
+        element: &str,
+    ) -> Result<MaterialId, GltfError> {
+        if let Some(index) = index {
+            lookup(&self.root.materials, index, element, "materials")?;
+            return Ok(MaterialId(index as u32));
+        }
+        let next = MaterialId(self.materials.len() as u32);
+        let id = *self.default_material.get_or_insert(next);
+        if id == next {
+            self.materials.push(Named::new("default", GltfMaterial::default()));
+        }
+        self.materials[id.0 as usize].item.vertex_color |= colored;
+        Ok(id)
+    }
+}
+
+/// A warning for each material and mesh where a texture asks for coordinates that the mesh doesn't have.
+fn missing_coordinates(scene: &Scene<SourceMaterial>, file: &str, warnings: &mut Vec<Warning>) {
+    let mut told = BTreeSet::new();
+    for instance in &scene.instances {
+        let material = &scene.materials[instance.material.0 as usize];
+        let mesh: &Arc<Mesh> = &scene.meshes[instance.mesh.0 as usize];
+        let SourceMaterial::Gltf(source) = &material.item else { continue };
+        if !told.insert((instance.mesh, instance.material)) {
+            continue;
+        }
+        let lacking = source.textures().find(|(_, map)| map.uv_set as usize >= mesh.uvs.len());
+        if let Some((field, map)) = lacking {
+            let message = format!(
+                "its {field} uses TEXCOORD_{}, which mesh {:?} doesn't have",
+                map.uv_set, mesh.name
+            );
+            warnings.push(Warning::new(format!("{file}: material {:?}", material.name), message));
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Textures, samplers and images: each image is decoded once, and each texture made once for each encoding it is used with.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{Affine2, Mat2, Vec2};
+use gltf::json::Root;
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::material::NormalTexture;
+use gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+
+use super::buffers::{Buffers, lookup, read_file, resolve};
+use super::error::GltfError;
+use super::uri::Target;
+use crate::import::Files;
+use crate::import::images::decode_image;
+use crate::math::Real;
+use crate::scene::material::{TextureChannel, TextureMap};
+use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
+use crate::scene::{Image, ImageId, Texture, TextureId};
+
+/// The most bytes that all decoded images of a file may take together.
+const MAX_DECODED: u64 = 8 << 30;
+
+/// What all texture slots of a material have in common.
+pub(super) struct Slot {
+    index: usize,
+    tex_coord: u32,
+    transform: Option<TextureTransform>,
+}
+
+impl From<&Info> for Slot {
+    fn from(info: &Info) -> Self {
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.clone());
+        Self { index: info.index.value(), tex_coord: info.tex_coord, transform }
+    }
+}
+
+impl Slot {
+    /// A `normalTexture`, for whose transform the crate has no field.
+    pub(super) fn normal(texture: &NormalTexture) -> Result<Self, GltfError> {
+        let extensions = texture.extensions.as_ref();
+        let transform = match extensions.and_then(|e| e.others.get("KHR_texture_transform")) {
+            Some(json) => Some(gltf::json::deserialize::from_value(json.clone())?),
+            None => None,
+        };
+        Ok(Self { index: texture.index.value(), tex_coord: texture.tex_coord, transform })
+    }
+}
+
+/// The textures of a file, made as materials ask for them.
+pub(super) struct Textures<'a> {
+    root: &'a Root,
+    buffers: &'a Buffers<'a>,
+    files: &'a mut Files,
+    textures: Vec<Texture>,
+    images: Vec<Arc<Image>>,
+    by_source: BTreeMap<usize, ImageId>,
+    by_use: BTreeMap<(usize, bool), TextureId>,
+    decoded: u64,
+}
+
+impl<'a> Textures<'a> {
+    /// The textures of `root`, none of them made yet.
+    pub(super) fn new(root: &'a Root, buffers: &'a Buffers<'a>, files: &'a mut Files) -> Self {
+        Self {
+            root,
+            buffers,
+            files,
+            textures: Vec::new(),
+            images: Vec::new(),
+            by_source: BTreeMap::new(),
+            by_use: BTreeMap::new(),
+            decoded: 0,
+        }
+    }
+
+    /// What was made.
+    pub(super) fn finish(self) -> (Vec<Texture>, Vec<Arc<Image>>) {
+        (self.textures, self.images)
+    }
+
+    /// The texture of `slot`, whose values mean `encoding`, as `element` uses it.
+    pub(super) fn map(
+        &mut self,
+        slot: &Slot,
+        encoding: Encoding,
+        element: &str,
+    ) -> Result<TextureMap, GltfError> {
+        let texture = self.texture(slot.index, encoding, element)?;
+        let (mut uv_set, mut texture_from_uv) = (slot.tex_coord, Affine2::IDENTITY);
+        if let Some(transform) = &slot.transform {
+            uv_set = transform.tex_coord.unwrap_or(uv_set);
+            texture_from_uv = affine(transform);
+            if !texture_from_uv.is_finite() {
+                return Err(GltfError::Invalid {
+                    element: element.to_owned(),
+                    property: "KHR_texture_transform",
+                    expected: "finite numbers",
+                });
+            }
+        }
+        Ok(TextureMap { texture, channel: TextureChannel::R, uv_set, texture_from_uv })
+    }
+
+    fn texture(&mut self, index: usize, encoding: Encoding, element: &str) -> Result<TextureId, GltfError> {
+        let key = (index, encoding == Encoding::Srgb);
+        if let Some(&id) = self.by_use.get(&key) {
+            return Ok(id);
+        }
+        let json = lookup(&self.root.textures, index, element, "textures")?;
+        let name = format!("textures[{index}]");
+        let source = json.source.value();
+        if source == u32::MAX as usize {
+            let others = json.extensions.as_ref().map(|e| &e.others);
+            for extension in ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds", "EXT_texture_avif"] {
+                if others.is_some_and(|o| o.contains_key(extension)) {
+                    return Err(GltfError::Extension { element: name, extension });
+                }
+            }
+            return Err(GltfError::Missing { element: name, property: "source" });
+        }
+        let (wrap, filter) = match json.sampler {
+            Some(sampler) => {
+                let index = sampler.value();
+                read_sampler(lookup(&self.root.samplers, index, &name, "samplers")?, index)?
+            }
+            None => ([Wrap::Repeat; 2], TexelFilter::Bilinear),
+        };
+        let image = self.image(source, &name)?;
+        let id = TextureId(self.textures.len() as u32);
+        self.textures.push(Texture { image, encoding, wrap, filter });
+        self.by_use.insert(key, id);
+        Ok(id)
+    }
+
+    fn image(&mut self, index: usize, element: &str) -> Result<ImageId, GltfError> {
+        if let Some(&id) = self.by_source.get(&index) {
+            return Ok(id);
+        }
+        let json = lookup(&self.root.images, index, element, "images")?;
+        let element = format!("images[{index}]");
+        let name = |fallback: &str| json.name.clone().unwrap_or_else(|| fallback.to_owned());
+        let image = match (&json.uri, json.buffer_view) {
+            (_, Some(view)) => {
+                let (bytes, _) = self.buffers.view(self.root, view.value(), &element)?;
+                decode_image(bytes, &name(&element))?
+            }
+            (Some(uri), None) => match resolve(uri, &element)? {
+                Target::Data(bytes) => decode_image(&bytes, &name(&element))?,
+                Target::File(file) => decode_image(&read_file(self.files, &file, &element)?, &file)?,
+            },
+            (None, None) => return Err(GltfError::Missing { element, property: "uri or bufferView" }),
+        };
+        self.decoded = self.decoded.saturating_add(match &image.pixels {
+            Pixels::U8(v) => v.len() as u64,
+            Pixels::U16(v) => v.len() as u64 * 2,
+            Pixels::F32(v) => v.len() as u64 * 4,
+        });
+        if self.decoded > MAX_DECODED {
+            return Err(GltfError::TooMany { what: "bytes of decoded images", limit: MAX_DECODED });
+        }
+        let id = ImageId(self.images.len() as u32);
+        self.images.push(Arc::new(image));
+        self.by_source.insert(index, id);
+        Ok(id)
+    }
+}
+
+/// Wrapping and filter of a sampler. There are no mip levels, so the magnification filter alone counts.
+fn read_sampler(sampler: &Sampler, index: usize) -> Result<([Wrap; 2], TexelFilter), GltfError> {
+    let invalid = |property, expected| GltfError::Invalid {
+        element: format!("samplers[{index}]"),
+        property,
+        expected,
+    };
+    let wrap = |mode: Checked<WrappingMode>, property| match mode {
+        Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
+        Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::Mirror),
+        Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::Clamp),
+        Checked::Invalid => Err(invalid(property, "10497, 33071 or 33648")),
+    };
+    let filter = match sampler.mag_filter {
+        Some(Checked::Valid(MagFilter::Nearest)) => TexelFilter::Nearest,
+        Some(Checked::Valid(MagFilter::Linear)) | None => TexelFilter::Bilinear,
+        Some(Checked::Invalid) => return Err(invalid("magFilter", "9728 or 9729")),
+    };
+    Ok(([wrap(sampler.wrap_s, "wrapS")?, wrap(sampler.wrap_t, "wrapT")?], filter))
+}
+
+/// KHR_texture_transform: uv' = T·R·S·uv with R = [[c, s], [-s, c]]. The extension's text and sample images turn this way; its GLSL
+/// listing has the sign wrong.
+fn affine(transform: &TextureTransform) -> Affine2 {
+    let (s, c) = (Real::sin(transform.rotation.0), Real::cos(transform.rotation.0));
+    // Columns: R's first is (c, -s), its second (s, c).
+    let rotation = Mat2::from_cols(Vec2::new(c, -s), Vec2::new(s, c));
+    let scale = Mat2::from_diagonal(Vec2::from(transform.scale.0));
+    Affine2::from_mat2_translation(rotation * scale, Vec2::from(transform.offset.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_transforms_scale_then_turn_then_move() {
+        let json = r#"{"offset": [0.5, 0.25], "rotation": 1.5707963267948966, "scale": [2.0, 3.0]}"#;
+        let transform = gltf::json::deserialize::from_str(json).unwrap();
+        let at = |u, v| affine(&transform).transform_point2(Vec2::new(u, v));
+        // R turns (1, 0) to (0, -1) and (0, 1) to (1, 0).
+        assert!((at(1.0, 0.0) - Vec2::new(0.5, -1.75)).length() < 1e-6);
+        assert!((at(0.0, 1.0) - Vec2::new(3.5, 0.25)).length() < 1e-6);
+    }
+
+    #[test]
+    fn samplers_are_read_and_checked() {
+        let read = |json: &str| read_sampler(&gltf::json::deserialize::from_str(json).unwrap(), 0);
+        assert_eq!(read("{}").unwrap(), ([Wrap::Repeat; 2], TexelFilter::Bilinear));
+        let json = r#"{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9987}"#;
+        assert_eq!(read(json).unwrap(), ([Wrap::Clamp, Wrap::Mirror], TexelFilter::Nearest));
+        assert!(matches!(read(r#"{"wrapT": 1}"#), Err(GltfError::Invalid { property: "wrapT", .. })));
+    }
+}
