@@ -1,0 +1,3 @@
+//! The statue.
+use super::{MakeError, Made};
+pub(crate) fn make() -> Result<Vec<Made>, MakeError> { Ok(vec![]) }
