@@ -45,6 +45,7 @@ pub mod convert;
 pub mod disney;
 pub mod imagefile;
 pub mod import;
+pub mod job;
 pub mod light;
 pub mod manifest;
 pub mod math;

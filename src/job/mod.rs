@@ -12,8 +12,7 @@ use std::path::PathBuf;
 pub use identity::Build;
 pub use load::{LoadedScene, load};
 pub use run::{
-    Destination, PlannedJob, References, compare_with_reference, failed_record, finished, image_path, plan, record_path,
-    reference_of, run,
+    Destination, PlannedJob, References, failed_record, finished, image_path, plan, recheck, record_path, reference_of, run,
 };
 
 /// Why a job can't be done.

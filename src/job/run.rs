@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::identity::identify;
 use super::{Build, JobError, LoadedScene};
-use crate::compare::{self, Options, StrictLimits, Thresholds};
+use crate::compare::{self, Options, StrictLimits, Thresholds, strict};
 use crate::imagefile;
 use crate::import::{FileDigest, read_environment};
 use crate::manifest::edit;
@@ -175,9 +175,29 @@ fn attempt(
     Ok(())
 }
 
+/// Compares the finished image of an earlier run again, since references may have changed, and keeps the new verdict.
+///
+/// # Errors
+/// If the record can't be written.
+pub fn recheck(record: &mut JobRecord, destination: &Destination) -> Result<(), JobError> {
+    let path = image_path(&destination.folder, &record.job.name);
+    let (verdict, cross_check) = match &destination.references {
+        None => (Verdict::NotCompared, CrossCheck::NotRun),
+        Some(references) => match imagefile::read(&path) {
+            Ok(raster) => compare_with_reference(&path, &raster, &record.job.name, references),
+            Err(error) => (Verdict::Error { why: error.to_string() }, CrossCheck::NotRun),
+        },
+    };
+    if (&verdict, &cross_check) != (&record.verdict, &record.cross_check) {
+        (record.verdict, record.cross_check) = (verdict, cross_check);
+        write_record(record, &destination.folder)?;
+    }
+    Ok(())
+}
+
 /// Compares a result with its reference by the built-in comparator, and lets the real `idiff` confirm it. The reference decides
 /// which of the result's channels are compared.
-pub fn compare_with_reference(
+fn compare_with_reference(
     path: &Path,
     result: &Raster,
     name: &str,
@@ -191,7 +211,7 @@ pub fn compare_with_reference(
     let outcome = || -> Result<(Verdict, CrossCheck), JobError> {
         let reference = imagefile::read(&reference_path)?;
         let comparable = restricted_to(result, &reference);
-        let verdict = compare::compare(&comparable, &reference, &references.limits)?.verdict();
+        let verdict = strict::compare(&comparable, &reference, &references.limits)?.verdict();
         let program = references.idiff.as_deref();
         let check =
             compare::cross_check(program, path, &reference_path, &references.thresholds, Options::default())?;

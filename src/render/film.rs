@@ -24,6 +24,8 @@ const MAX_REPLICATES: usize = 64;
 pub struct Control {
     /// Camera paths finished so far.
     pub paths: AtomicU64,
+    /// Camera paths there will be; 0 until the render begins.
+    pub total_paths: AtomicU64,
     /// Set to stop: the render ends with [`RenderError::Cancelled`].
     pub stop: AtomicBool,
 }
@@ -63,6 +65,8 @@ struct Tile {
 pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderError> {
     let (width, height) = scene.size();
     let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
+    let total_paths = u64::from(width) * u64::from(height) * u64::from(scene.settings.spp);
+    control.total_paths.store(total_paths, Ordering::Relaxed);
     let tiles: Vec<Tile> = (0..columns * rows)
         .into_par_iter()
         .map(|i| render_tile(scene, i % columns * TILE, i / columns * TILE, control))
@@ -81,7 +85,7 @@ pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderErr
         counts.bad_samples += tile.bad.len() as u64;
         counts.first_bad_samples.extend(&tile.bad);
     }
-    counts.paths = u64::from(width) * u64::from(height) * u64::from(scene.settings.spp);
+    counts.paths = total_paths;
     counts.first_bad_samples.sort_unstable_by_key(|b| (b.y, b.x, b.sample));
     counts.first_bad_samples.truncate(NAMED_BAD_SAMPLES);
     Ok(Rendered { raster: layers(scene, &pixels), counts })

@@ -1,0 +1,244 @@
+//! Doing the jobs of a sweep.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::{Sweep, SweepError, SweepResult, present};
+use crate::compare::{Limits, StrictLimits, Thresholds, find_idiff};
+use crate::convert::ConvertOptions;
+use crate::import::ImportOptions;
+use crate::job::{self, Build, Destination, JobError, LoadedScene, References};
+use crate::manifest::{self, CompareSpec};
+use crate::record::{Job, JobRecord, Outcome};
+use crate::render::Control;
+
+/// How a sweep is run.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The folder of results, instead of the manifest's.
+    pub folder: Option<PathBuf>,
+    /// Render again what is already there.
+    pub force: bool,
+    /// Stop after the first job that fails.
+    pub fail_fast: bool,
+    /// Only a part of the jobs.
+    pub shard: Option<Shard>,
+    /// The real `idiff`; looked for where absent.
+    pub idiff: Option<PathBuf>,
+}
+
+/// The `index`-th of `count` parts of the jobs, split by key: every machine comes to the same split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1.
+    pub index: u32,
+    /// At least 1.
+    pub count: u32,
+}
+
+impl Shard {
+    fn holds(self, key: &str) -> bool {
+        let number = u64::from_str_radix(key.get(..15).unwrap_or("0"), 16).unwrap_or(0);
+        number % u64::from(self.count) == u64::from(self.index - 1)
+    }
+}
+
+/// Somebody who watches a sweep.
+pub trait Observer {
+    /// A job is about to be rendered; `control` tells how far it is.
+    fn started(&mut self, job: &Job, control: &Arc<Control>);
+    /// A job is done, failed, or was found finished.
+    fn finished(&mut self, record: &JobRecord, reused: bool);
+    /// A job belongs to another shard.
+    fn left_out(&mut self, job: &Job);
+}
+
+/// Nobody watches.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Observer for Silent {
+    fn started(&mut self, _: &Job, _: &Arc<Control>) {}
+    fn finished(&mut self, _: &JobRecord, _: bool) {}
+    fn left_out(&mut self, _: &Job) {}
+}
+
+/// Runs a sweep: every path of the manifest is checked against every scene first; then job after job is rendered or reused,
+/// and at last the sheet and the page are made of what is there.
+///
+/// # Errors
+/// If the manifest does not fit a scene, or results can't be kept. A job that fails is no error but a record.
+pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Result<SweepResult, SweepError> {
+    let folder = options.folder.clone().unwrap_or_else(|| sweep.folder.clone());
+    create_folders(sweep, &folder)?;
+    let build = Build::current()?;
+    let references = match &sweep.manifest.compare {
+        Some(spec) => Some(references(sweep, spec, options.idiff.as_deref())?),
+        None => None,
+    };
+    let destination = Destination { folder, references };
+
+    let mut scenes = Scenes::default();
+    for path in scene_paths(&sweep.jobs) {
+        if let Ok(loaded) = scenes.get(path) {
+            manifest::check(&sweep.manifest, &loaded.scene, path)?;
+        }
+    }
+
+    let mut records = Vec::new();
+    let mut reused = 0;
+    for job in &sweep.jobs {
+        match run_job(job, scenes.get(&job.scene), &build, &destination, options, observer)? {
+            Turn::LeftOut => observer.left_out(job),
+            Turn::Reused(record) => {
+                reused += 1;
+                observer.finished(&record, true);
+                records.push(record);
+            }
+            Turn::Done(record) => {
+                observer.finished(&record, false);
+                let failed = matches!(record.outcome, Outcome::Failed { .. });
+                records.push(record);
+                if failed && options.fail_fast {
+                    break;
+                }
+            }
+        }
+    }
+    let presentation = present::present(sweep, &records, reused, &destination.folder);
+    Ok(SweepResult { records, reused, presentation })
+}
+
+enum Turn {
+    LeftOut,
+    Reused(JobRecord),
+    Done(JobRecord),
+}
+
+fn run_job(
+    job: &Job,
+    loaded: Result<&LoadedScene, String>,
+    build: &Build,
+    destination: &Destination,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<Turn, SweepError> {
+    let planned = loaded.and_then(|loaded| {
+        let planned = job::plan(job, loaded, build).map_err(|error| error.to_string())?;
+        Ok((planned, loaded))
+    });
+    let (planned, loaded) = match planned {
+        Ok(pair) => pair,
+        Err(error) => {
+            return Ok(Turn::Done(job::failed_record(job, build, &destination.folder, &error)?));
+        }
+    };
+    if options.shard.is_some_and(|shard| !shard.holds(&planned.key)) {
+        return Ok(Turn::LeftOut);
+    }
+    if !options.force
+        && let Some(mut record) = job::finished(&planned, &destination.folder)
+    {
+        job::recheck(&mut record, destination)?;
+        return Ok(Turn::Reused(record));
+    }
+    let control = Arc::new(Control::default());
+    observer.started(job, &control);
+    Ok(Turn::Done(job::run(&planned, loaded, build, destination, &control)?))
+}
+
+/// Loaded scenes: only the last one is kept, since jobs come scene by scene, but every failure.
+#[derive(Default)]
+struct Scenes {
+    last: Option<(PathBuf, LoadedScene)>,
+    failed: BTreeMap<PathBuf, String>,
+}
+
+impl Scenes {
+    fn get(&mut self, path: &Path) -> Result<&LoadedScene, String> {
+        if let Some(error) = self.failed.get(path) {
+            return Err(error.clone());
+        }
+        if self.last.as_ref().is_none_or(|(last, _)| last != path) {
+            self.last = None;
+            let load = |path| -> Result<LoadedScene, JobError> {
+                job::load(path, &ImportOptions::default(), &ConvertOptions::default())
+            };
+            match load(path) {
+                Ok(loaded) => self.last = Some((path.to_owned(), loaded)),
+                Err(error) => {
+                    let message = error.to_string();
+                    self.failed.insert(path.to_owned(), message.clone());
+                    return Err(message);
+                }
+            }
+        }
+        self.last.as_ref().map(|(_, loaded)| loaded).ok_or_else(String::new)
+    }
+}
+
+/// The scenes of the jobs, each once, in order.
+fn scene_paths(jobs: &[Job]) -> Vec<&Path> {
+    let mut paths: Vec<&Path> = jobs.iter().map(|j| j.scene.as_path()).collect();
+    paths.dedup();
+    paths
+}
+
+/// The folder of results and those that job names lead into.
+fn create_folders(sweep: &Sweep, folder: &Path) -> Result<(), SweepError> {
+    let images = sweep.jobs.iter().map(|job| job::image_path(folder, &job.name));
+    let parents: std::collections::BTreeSet<PathBuf> =
+        images.filter_map(|path| path.parent().map(Path::to_owned)).collect();
+    for path in parents.into_iter().chain([folder.to_owned()]) {
+        std::fs::create_dir_all(&path).map_err(|cause| SweepError::Folder { path, cause })?;
+    }
+    Ok(())
+}
+
+fn references(sweep: &Sweep, spec: &CompareSpec, idiff: Option<&Path>) -> Result<References, SweepError> {
+    let number = |value: Option<f64>, default: f32| value.map_or(default, |v| v as f32);
+    let count = |value: Option<u64>| u32::try_from(value.unwrap_or(0)).unwrap_or(u32::MAX);
+    let (limits, thresholds) = (Limits::default(), Thresholds::default());
+    Ok(References {
+        folder: sweep.manifest.folder().join(&spec.references),
+        limits: StrictLimits {
+            picture: Limits {
+                fail: number(spec.fail, limits.fail),
+                fail_relative: number(spec.failrelative, limits.fail_relative),
+                fail_percent: number(spec.failpercent, limits.fail_percent),
+                allow_failures: count(spec.allowfailures),
+                hard_fail: number(spec.hardfail, limits.hard_fail),
+                mean: number(spec.mean, limits.mean),
+                rms: number(spec.rms, limits.rms),
+            },
+            layers: BTreeMap::new(),
+        },
+        thresholds: Thresholds {
+            fail: number(spec.fail, thresholds.fail),
+            failpercent: number(spec.failpercent, thresholds.failpercent),
+            failrelative: number(spec.failrelative, thresholds.failrelative),
+            hardfail: number(spec.hardfail, thresholds.hardfail),
+            allowfailures: count(spec.allowfailures),
+            warn: number(spec.warn, thresholds.warn),
+            warnpercent: number(spec.warnpercent, thresholds.warnpercent),
+            warnrelative: number(spec.warnrelative, thresholds.warnrelative),
+            hardwarn: number(spec.hardwarn, thresholds.hardwarn),
+        },
+        idiff: find_idiff(idiff)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_belongs_to_one_shard() {
+        for i in 0..100u8 {
+            let key = blake3::hash(&[i]).to_hex().to_string();
+            let holders = (1..=3).filter(|&index| Shard { index, count: 3 }.holds(&key)).count();
+            assert_eq!(holders, 1);
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The house's rules: which module may use which, how long files are, and where unsafe code may stand.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Every module of the crate with its floor: a module uses only floors below its own.
+const FLOORS: [(&str, u32); 24] = [
+    ("cli", 8),
+    ("check", 7),
+    ("sweep", 6),
+    ("job", 5),
+    ("report", 5),
+    ("render", 4),
+    ("compare", 4),
+    ("output", 4),
+    ("import", 3),
+    ("convert", 3),
+    ("manifest", 3),
+    ("accel", 3),
+    ("light", 3),
+    ("record", 2),
+    ("settings", 1),
+    ("scene", 2),
+    ("imagefile", 2),
+    ("disney", 1),
+    ("raster", 1),
+    ("math", 0),
+    ("color", 0),
+    ("main", 9),
+    ("lib", 10),
+    ("pipeline", 8),
+];
+
+fn sources() -> Vec<PathBuf> {
+    fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
+        for entry in fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path()) {
+            if entry.is_dir() {
+                collect(&entry, files);
+            } else if entry.extension().is_some_and(|e| e == "rs") {
+                files.push(entry);
+            }
+        }
+    }
+    let mut files = Vec::new();
+    collect(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    files.sort();
+    files
+}
+
+fn module_of(path: &Path) -> String {
+    let inside = path.strip_prefix(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).expect("inside src");
+    let first = inside.components().next().expect("a name").as_os_str().to_string_lossy();
+    first.trim_end_matches(".rs").to_owned()
+}
+
+/// The modules that `crate::NAME` paths in the code name, one or several in braces; comments and strings of documentation don't
+/// count.
+fn used_modules(code: &str) -> Vec<String> {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let mut used = Vec::new();
+    for line in code.lines().filter(|l| !l.trim_start().starts_with("//")) {
+        for (at, _) in line.match_indices("crate::") {
+            // `$crate` and `my_crate` are other words.
+            if line[..at].ends_with(|c: char| is_name(c) || c == '$') {
+                continue;
+            }
+            let rest = &line[at + "crate::".len()..];
+            let names: Vec<&str> = match rest.strip_prefix('{') {
+                Some(list) => list.split(['}', ';']).next().unwrap_or("").split(',').map(str::trim).collect(),
+                None => vec![rest],
+            };
+            let first = |name: &str| name.chars().take_while(|c| is_name(*c)).collect::<String>();
+            used.extend(names.into_iter().map(first).filter(|n| !n.is_empty()));
+        }
+    }
+    used
+}
+
+#[test]
+fn every_module_uses_only_floors_below_its_own() {
+    let floors: BTreeMap<&str, u32> = FLOORS.into_iter().collect();
+    let mut wrong = Vec::new();
+    for path in sources() {
+        let module = module_of(&path);
+        let floor = *floors.get(module.as_str()).unwrap_or_else(|| panic!("{module} has no floor"));
+        let code = fs::read_to_string(&path).expect("readable");
+        for used in used_modules(&code) {
+            if used == module || module == "lib" {
+                continue;
+            }
+            match floors.get(used.as_str()) {
+                Some(&below) if below < floor => {}
+                Some(&other) => wrong.push(format!("{}: floor {floor} uses {used} of floor {other}", path.display())),
+                None => wrong.push(format!("{}: crate::{used} is not a module with a floor", path.display())),
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_file_reaches_over_its_neighbour_or_grows_beyond_a_room() {
+    let mut wrong = Vec::new();
+    for path in sources() {
+        let code = fs::read_to_string(&path).expect("readable");
+        if code.contains("super::super") {
+            wrong.push(format!("{}: super::super", path.display()));
+        }
+        let lines = code.lines().count();
+        if lines > 600 {
+            wrong.push(format!("{}: {lines} lines want two rooms", path.display()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn there_is_no_unsafe_code() {
+    for path in sources() {
+        let code = fs::read_to_string(&path).expect("readable");
+        let unsafe_lines = code
+            .lines()
+            .filter(|l| !l.trim_start().starts_with("//"))
+            .filter(|l| l.contains("unsafe ") || l.contains("allow(unsafe_code)"))
+            .count();
+        assert_eq!(unsafe_lines, 0, "{}", path.display());
+    }
+}
+
+/// The scanner itself must see what it is meant to see.
+#[test]
+fn the_scan_finds_paths_in_all_their_forms() {
+    let code = "use crate::render::Geometry;\nfn f(x: crate::light::Lights) {}\nuse crate::{cli, sweep::run};\n// crate::x\n";
+    assert_eq!(used_modules(code), ["render", "light", "cli", "sweep"]);
+}
