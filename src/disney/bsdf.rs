@@ -49,10 +49,16 @@ pub struct BsdfSample<F = f32> {
     pub eta: F,
 }
 
+/// The sample of a lobe that isn't a delta, `None` where no direction was found: its density is 0 then.
+#[inline]
+pub(super) fn reflection<F: Real>(f: Rgb<F>, wi: V3<F>, pdf: F, lobe: Lobe) -> Option<BsdfSample<F>> {
+    (pdf > F::ZERO && pdf.is_finite()).then_some(BsdfSample { f, wi, pdf, lobe, eta: F::ONE })
+}
+
 /// How a surface scatters light at one point, in the local frame whose z is the shading normal.
 ///
 /// Directions are unit vectors that point away from the surface. Only the dielectric scatters below the horizon; all else is black
-/// from behind. Materials that lend the back a surface turn the frame before they ask.
+/// from behind, so a two-sided material turns the frame first.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<F = f32> {
     kind: Kind<F>,
@@ -119,15 +125,16 @@ impl<F: Real> Bsdf<F> {
     /// `None` where the path ends: `wo` is below the horizon, or the direction came out below.
     #[inline]
     pub fn sample(&self, wo: V3<F>, u_lobe: F, u: [F; 2]) -> Option<BsdfSample<F>> {
-        let (wi, lobe) = match &self.kind {
+        match &self.kind {
             Kind::Disney(mixture) if wo.z > F::ZERO => mixture.sample(wo, u_lobe, u),
-            Kind::Lambert { .. } if wo.z > F::ZERO => (cosine_hemisphere(u), Lobe::Diffuse),
-            Kind::Disney(_) | Kind::Lambert { .. } => return None,
-            Kind::Mirror => return sample_mirror(wo),
-            Kind::Dielectric(dielectric) => return dielectric.sample(wo, u_lobe),
-        };
-        let (f, pdf) = self.eval_with_pdf(wo, wi);
-        (pdf > F::ZERO && pdf.is_finite()).then_some(BsdfSample { f, wi, pdf, lobe, eta: F::ONE })
+            Kind::Lambert { base_color } if wo.z > F::ZERO => {
+                let wi = cosine_hemisphere(u);
+                reflection(*base_color * F::FRAC_1_PI, wi, cosine_hemisphere_pdf(wi.z), Lobe::Diffuse)
+            }
+            Kind::Disney(_) | Kind::Lambert { .. } => None,
+            Kind::Mirror => sample_mirror(wo),
+            Kind::Dielectric(dielectric) => dielectric.sample(wo, u_lobe),
+        }
     }
 
     /// Nothing but delta lobes: next-event estimation can't find light here.

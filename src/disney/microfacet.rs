@@ -63,9 +63,9 @@ impl<F: Real> Gtr2<F> {
         // A point c of the cap of the unit sphere with c.z > -w.z. The sums 1 ± c.z are formed without cancellation.
         let below_top = u[1] * (F::ONE + w.z);
         let sin = (below_top * (F::of(2.0) - below_top)).safe_sqrt();
-        let phi = F::of(2.0) * F::PI * u[0];
+        let (sin_phi, cos_phi) = u[0].sin_cos_turn();
         let h_z = (F::ONE - u[1]) * (F::ONE + w.z);
-        V3::new(ax * (sin * phi.cos() + w.x), ay * (sin * phi.sin() + w.y), h_z)
+        V3::new(ax * (sin * cos_phi + w.x), ay * (sin * sin_phi + w.y), h_z)
     }
 }
 
@@ -116,8 +116,8 @@ impl<F: Real> Gtr1<F> {
         let growth = exp_m1(-u[1] * self.ln_a2);
         let sin2 = (self.a2 * growth / (F::ONE - self.a2)).clamp(F::ZERO, F::ONE);
         let (sin, cos) = (sin2.sqrt(), (F::ONE - sin2).sqrt());
-        let phi = F::of(2.0) * F::PI * u[0];
-        V3::new(sin * phi.cos(), sin * phi.sin(), cos)
+        let (sin_phi, cos_phi) = u[0].sin_cos_turn();
+        V3::new(sin * cos_phi, sin * sin_phi, cos)
     }
 }
 

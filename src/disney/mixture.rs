@@ -1,6 +1,6 @@
 //! All of Burley 2012: the lobes together, and how often each is sampled.
 
-use super::bsdf::Lobe;
+use super::bsdf::{BsdfSample, Lobe, reflection};
 use super::clearcoat::Clearcoat;
 use super::diffuse::Diffuse;
 use super::pair::Pair;
@@ -69,8 +69,12 @@ impl<F: Real> Mixture<F> {
     /// The BRDF, and the density of [`Self::sample`] per unit solid angle.
     #[inline]
     pub(super) fn eval_with_pdf(&self, wo: V3<F>, wi: V3<F>) -> (Rgb<F>, F) {
+        self.eval_with_pdf_given(&self.probabilities(wo), wo, wi)
+    }
+
+    #[inline]
+    fn eval_with_pdf_given(&self, chance: &Probabilities<F>, wo: V3<F>, wi: V3<F>) -> (Rgb<F>, F) {
         let Some(pair) = Pair::new(wo, wi) else { return (Rgb::BLACK, F::ZERO) };
-        let chance = self.probabilities(wo);
         let (mut f, pdf_specular) = self.specular.eval_with_pdf(&pair);
         let mut pdf = chance.specular * pdf_specular;
         if let Some(diffuse) = &self.diffuse {
@@ -89,10 +93,17 @@ impl<F: Real> Mixture<F> {
         (f, pdf)
     }
 
-    /// A direction by one of the samplers, chosen by `u_lobe`, and the lobe it was made for. May lie below the horizon.
+    /// A direction by one of the samplers, chosen by `u_lobe`. `None` if it comes out below the horizon.
     #[inline]
-    pub(super) fn sample(&self, wo: V3<F>, u_lobe: F, u: [F; 2]) -> (V3<F>, Lobe) {
+    pub(super) fn sample(&self, wo: V3<F>, u_lobe: F, u: [F; 2]) -> Option<BsdfSample<F>> {
         let chance = self.probabilities(wo);
+        let (wi, lobe) = self.sample_direction(&chance, wo, u_lobe, u);
+        let (f, pdf) = self.eval_with_pdf_given(&chance, wo, wi);
+        reflection(f, wi, pdf, lobe)
+    }
+
+    #[inline]
+    fn sample_direction(&self, chance: &Probabilities<F>, wo: V3<F>, u_lobe: F, u: [F; 2]) -> (V3<F>, Lobe) {
         let mut rest = u_lobe - chance.cosine;
         if rest < F::ZERO {
             return (cosine_hemisphere(u), Lobe::Diffuse);

@@ -10,10 +10,15 @@ pub fn concentric_disk<F: Real>(u: [F; 2]) -> [F; 2] {
     if x == F::ZERO && y == F::ZERO {
         return [F::ZERO, F::ZERO];
     }
-    let quarter_pi = F::of(std::f64::consts::FRAC_PI_4);
-    let (r, phi) =
-        if x.abs() > y.abs() { (x, quarter_pi * (y / x)) } else { (y, quarter_pi * (two - x / y)) };
-    [r * phi.cos(), r * phi.sin()]
+    let half = F::of(0.5);
+    // The angle is π/4·y/x from the x axis in two of the square's quarters, π/4·x/y from the y axis in the others.
+    if x.abs() > y.abs() {
+        let (sin, cos) = (half * (y / x)).sin_cos_quarter();
+        [x * cos, x * sin]
+    } else {
+        let (sin, cos) = (half * (x / y)).sin_cos_quarter();
+        [y * sin, y * cos]
+    }
 }
 
 /// A direction of the upper hemisphere, by the cosine; its pdf is [`cosine_hemisphere_pdf`].
@@ -32,8 +37,8 @@ pub fn cosine_hemisphere_pdf<F: Real>(cos_theta: F) -> F {
 pub fn uniform_hemisphere<F: Real>(u: [F; 2]) -> V3<F> {
     let z = F::ONE - u[0];
     let r = (u[0] * (F::ONE + z)).safe_sqrt();
-    let phi = F::of(2.0) * F::PI * u[1];
-    V3::new(r * phi.cos(), r * phi.sin(), z)
+    let (sin, cos) = u[1].sin_cos_turn();
+    V3::new(r * cos, r * sin, z)
 }
 
 /// 1/2π per unit solid angle, above the horizon.
@@ -45,8 +50,8 @@ pub fn uniform_hemisphere_pdf<F: Real>() -> F {
 pub fn uniform_sphere<F: Real>(u: [F; 2]) -> V3<F> {
     let z = F::ONE - F::of(2.0) * u[0];
     let r = (F::ONE - z * z).safe_sqrt();
-    let phi = F::of(2.0) * F::PI * u[1];
-    V3::new(r * phi.cos(), r * phi.sin(), z)
+    let (sin, cos) = u[1].sin_cos_turn();
+    V3::new(r * cos, r * sin, z)
 }
 
 /// Barycentric coordinates (of the second and third vertex) of a point of a triangle, uniform by area, by Heitz' low-distortion
