@@ -145,9 +145,7 @@ impl Style<'_> {
         for (id, advance) in self.place(text).0 {
             // A quarter of a pixel keeps the spacing even; whole baselines keep horizontal strokes sharp.
             let position = point(((x + advance) * 4.0).round() / 4.0, y.round());
-            let Some(outline) =
-                self.font.outline_glyph(Glyph { id, scale: self.scale(), position })
-            else {
+            let Some(outline) = self.font.outline_glyph(Glyph { id, scale: self.scale(), position }) else {
                 continue;
             };
             let corner = outline.px_bounds().min;

@@ -146,8 +146,9 @@ impl Layout {
         let mut y = m.margin;
         let mut next = |shown: bool, style: Style<'_>| {
             let height = if shown { style.line_height() } else { 0 };
-            y += height;
-            full(y - height, height)
+            let area = full(y, height);
+            y += if shown { height + m.gutter / 3 } else { 0 };
+            area
         };
         let title = next(!sheet.title.is_empty(), m.titles(fonts));
         let subtitle = next(!sheet.subtitle.is_empty(), m.notes(fonts));
@@ -158,11 +159,12 @@ impl Layout {
         let note = m.notes(fonts).line_height();
         let column_title = Area { x: left, y, width: grid, height: note };
         if !sheet.columns.title.is_empty() {
-            y += note;
+            y += note + m.gutter / 4;
         }
         let label_line = m.labels(fonts).line_height();
         // The rows' name stands over their values, on the line of the columns' values.
-        let row_title = Area { x: m.margin, y: y + label_line.saturating_sub(note), width: row_label, height: note };
+        let row_title =
+            Area { x: m.margin, y: y + label_line.saturating_sub(note), width: row_label, height: note };
 
         let mut column_labels = Vec::with_capacity(columns);
         let mut row_labels = Vec::with_capacity(rows);
@@ -172,8 +174,11 @@ impl Layout {
             let column = |i: usize| left + i as u32 * (cell[0] + m.gutter);
             // A label may reach into the gutter, but not up to its neighbour.
             let reach = m.gutter / 3;
-            column_labels.extend((0..here).map(|i| {
-                Area { x: column(i) - reach, y, width: cell[0] + 2 * reach, height: head_height }
+            column_labels.extend((0..here).map(|i| Area {
+                x: column(i) - reach,
+                y,
+                width: cell[0] + 2 * reach,
+                height: head_height,
             }));
             y += head_height;
             for row in &mut cells {
@@ -275,6 +280,7 @@ fn check_size(cell: [u32; 2], caption: u32, [columns, rows]: [usize; 2]) -> Resu
     let width = u64::from(cell[0]).saturating_mul(columns as u64);
     let height = (u64::from(cell[1]) + u64::from(caption)).saturating_mul(rows as u64);
     // Neither may one side be out of bounds, nor the gutters of very many small cells.
-    let bounded = width <= MAX_SIDE && height <= MAX_SIDE && columns as u64 <= MAX_SIDE && rows as u64 <= MAX_SIDE;
+    let bounded =
+        width <= MAX_SIDE && height <= MAX_SIDE && columns as u64 <= MAX_SIDE && rows as u64 <= MAX_SIDE;
     if bounded { Ok(()) } else { Err(SheetError::TooLarge { width, height }) }
 }

@@ -9,12 +9,17 @@ mod draw;
 mod font;
 mod layout;
 
+mod page;
 mod picture;
+#[cfg(test)]
+mod samples;
 mod sheet;
-
+mod table;
 
 pub use canvas::Area;
 pub use draw::{draw_linear, draw_png, picture_area};
 pub use font::FontError;
+pub use page::{PageError, PageInput, PageJob, SheetFile, html};
 pub use picture::Picture;
 pub use sheet::{Cell, Entry, Heading, Level, Mark, Page, Plan, Sheet, SheetError, arrange};
+pub use table::{Summary, TableOptions, verdict_table};

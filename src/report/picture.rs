@@ -111,10 +111,12 @@ impl Span {
     /// Each pixel it touches with the share that it covers.
     fn weights(self) -> impl Iterator<Item = (usize, f64)> {
         let last = ((self.end.ceil() as usize).saturating_sub(1)).min(self.last);
-        (self.start as usize..=last).map(move |i| {
-            let share = self.end.min((i + 1) as f64) - self.start.max(i as f64);
-            (i, share)
-        }).filter(|(_, share)| *share > 0.0)
+        (self.start as usize..=last)
+            .map(move |i| {
+                let share = self.end.min((i + 1) as f64) - self.start.max(i as f64);
+                (i, share)
+            })
+            .filter(|(_, share)| *share > 0.0)
     }
 
     fn sum_of_weights(self) -> f64 {
@@ -128,7 +130,8 @@ mod tests {
     use crate::raster::Window;
 
     fn layer(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> Layer {
-        let plane: Vec<f32> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
+        let plane: Vec<f32> =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
         Layer::new("beauty", Window::sized(width, height))
             .with("R", plane.clone())
             .with("G", plane.clone())
@@ -148,7 +151,8 @@ mod tests {
     fn any_ratio_keeps_the_mean_and_a_constant() {
         let ramp = layer(101, 67, |x, y| (x * 3 + y * y) as f32);
         let mean = |p: &Picture| {
-            let sum: f64 = (0..p.height()).flat_map(|y| (0..p.width()).map(move |x| f64::from(p.pixel(x, y)[1]))).sum();
+            let sum: f64 =
+                (0..p.height()).flat_map(|y| (0..p.width()).map(move |x| f64::from(p.pixel(x, y)[1]))).sum();
             sum / f64::from(p.width() * p.height())
         };
         let whole = Picture::of(&ramp).unwrap();

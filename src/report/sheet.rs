@@ -160,8 +160,12 @@ pub enum SheetError {
         cells: usize,
     },
     /// The picture would be too large.
-    #[error("the sheet would have {width} × {height} pixels, the limit being {} a side and {} in all; \
-             give [sheet] a smaller cell_width", super::layout::MAX_SIDE, super::layout::MAX_PIXELS)]
+    #[error(
+        "the sheet would have {width} × {height} pixels, the limit being {} a side and {} in all; \
+             give [sheet] a smaller cell_width",
+        super::layout::MAX_SIDE,
+        super::layout::MAX_PIXELS
+    )]
     TooLarge {
         /// Columns.
         width: u64,
@@ -249,7 +253,8 @@ pub fn arrange<'a>(entries: Vec<Entry<'a>>, plan: &Plan) -> Result<Sheet<'a>, Sh
         }
         let page: Vec<usize> = others.iter().map(|&a| spots[a].0).collect();
         page_titles.entry(page.clone()).or_insert_with(|| {
-            let values: Vec<String> = others.iter().map(|&a| format!("{} = {}", axes[a], spots[a].1)).collect();
+            let values: Vec<String> =
+                others.iter().map(|&a| format!("{} = {}", axes[a], spots[a].1)).collect();
             values.join(",  ")
         });
         // Jobs without axes stand side by side, each under its name.
@@ -275,7 +280,8 @@ pub fn arrange<'a>(entries: Vec<Entry<'a>>, plan: &Plan) -> Result<Sheet<'a>, Sh
         None => (String::new(), BTreeMap::from([(0, String::new())])),
     };
     let row_heading = rows.map(heading);
-    let row_indices: Vec<usize> = row_heading.as_ref().map_or(vec![0], |(_, labels)| labels.keys().copied().collect());
+    let row_indices: Vec<usize> =
+        row_heading.as_ref().map_or(vec![0], |(_, labels)| labels.keys().copied().collect());
     let column_indices: Vec<usize> = column_labels.keys().copied().collect();
     let cells = column_indices.len().saturating_mul(row_indices.len()).saturating_mul(page_titles.len());
     if cells > MAX_CELLS {
@@ -323,9 +329,12 @@ impl Sides {
     fn choose(axes: &[String], plan: &Plan) -> Result<Self, SheetError> {
         let find = |side, name: &Option<String>| match name {
             None => Ok(None),
-            Some(name) => axes.iter().position(|axis| names(axis, name)).map(Some).ok_or_else(|| {
-                SheetError::UnknownAxis { side, axis: name.clone(), known: axes.to_vec() }
-            }),
+            Some(name) => axes
+                .iter()
+                .position(|axis| axis == name)
+                .or_else(|| axes.iter().position(|axis| is_part(axis, name)))
+                .map(Some)
+                .ok_or_else(|| SheetError::UnknownAxis { side, axis: name.clone(), known: axes.to_vec() }),
         };
         let (columns, rows) = (find("columns", &plan.columns)?, find("rows", &plan.rows)?);
         if let (Some(c), Some(r)) = (columns, rows)
@@ -341,17 +350,149 @@ impl Sides {
     }
 }
 
-/// Whether `name` is the axis, or one of the paths of a zipped axis.
-fn names(axis: &str, name: &str) -> bool {
-    axis == name || axis.split([',', '+', ' ']).any(|part| part == name)
+/// Whether `name` is one of the paths of a zipped axis, as in `material.a.roughness + material.b.roughness`.
+fn is_part(axis: &str, name: &str) -> bool {
+    axis.split(" + ").any(|part| part == name)
 }
 
 /// A job's index and label on each axis.
 fn spots<'j>(job: &'j Job, axes: &[String]) -> Result<Vec<(usize, &'j str)>, SheetError> {
-    let no_coordinate = |axis: &str| SheetError::NoCoordinate { job: job.name.clone(), axis: axis.to_owned() };
-    let spot = |axis: &String| job.coordinates.iter().find(|c| c.axis == *axis).map(|c| (c.index, c.label.as_str()));
+    let no_coordinate =
+        |axis: &str| SheetError::NoCoordinate { job: job.name.clone(), axis: axis.to_owned() };
+    let spot =
+        |axis: &String| job.coordinates.iter().find(|c| c.axis == *axis).map(|c| (c.index, c.label.as_str()));
     if let Some(other) = job.coordinates.iter().find(|c| !axes.contains(&c.axis)) {
         return Err(SheetError::OtherAxis { job: job.name.clone(), axis: other.axis.clone() });
     }
     axes.iter().map(|axis| spot(axis).ok_or_else(|| no_coordinate(axis))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::samples::{job, record};
+
+    const ROUGH: &str = "material.ball.roughness";
+    const COLOR: &str = "material.ball.base_color";
+    const SEED: &str = "render.seed";
+
+    /// Each cell as the text of its failure, which is the job's name; `-` where it is missing.
+    fn names(page: &Page<'_>) -> Vec<Vec<String>> {
+        let name = |cell: &Cell<'_>| match cell {
+            Cell::Failed { why } => why.clone(),
+            _ => "-".to_owned(),
+        };
+        page.cells.iter().map(|row| row.iter().map(name).collect()).collect()
+    }
+
+    fn entries(jobs: &[Job]) -> Vec<Entry<'static>> {
+        let leaked = jobs.to_vec().leak();
+        leaked.iter().map(|job| Entry { job, cell: Cell::Failed { why: job.name.clone() } }).collect()
+    }
+
+    #[test]
+    fn one_axis_makes_one_row_in_the_order_of_its_values() {
+        let jobs =
+            [job("b", &[(ROUGH, 1, "0.5")]), job("c", &[(ROUGH, 7, "1.0")]), job("a", &[(ROUGH, 0, "0.0")])];
+        let sheet = arrange(entries(&jobs), &Plan::default()).unwrap();
+        assert_eq!(
+            sheet.columns,
+            Heading { title: ROUGH.into(), labels: vec!["0.0".into(), "0.5".into(), "1.0".into()] }
+        );
+        assert_eq!(sheet.rows, None);
+        assert_eq!(names(&sheet.pages[0]), [["a", "b", "c"]]);
+    }
+
+    #[test]
+    fn two_axes_make_a_grid_and_excluded_places_are_missing() {
+        let jobs = [
+            job("r0", &[(ROUGH, 0, "0.0"), (COLOR, 0, "copper")]),
+            job("r1", &[(ROUGH, 1, "1.0"), (COLOR, 0, "copper")]),
+            job("s1", &[(ROUGH, 1, "1.0"), (COLOR, 1, "steel")]),
+        ];
+        let plan = Plan { columns: Some(ROUGH.into()), ..Plan::default() };
+        let sheet = arrange(entries(&jobs), &plan).unwrap();
+        assert_eq!(sheet.rows.as_ref().unwrap().labels, ["copper", "steel"]);
+        assert_eq!(names(&sheet.pages[0]), [["r0", "r1"], ["-", "s1"]]);
+        let turned = arrange(entries(&jobs), &Plan { rows: Some(ROUGH.into()), ..Plan::default() }).unwrap();
+        assert_eq!(names(&turned.pages[0]), [["r0", "-"], ["r1", "s1"]]);
+    }
+
+    #[test]
+    fn further_axes_are_pages_named_by_their_values() {
+        let mut jobs = Vec::new();
+        for (s, r, c) in (0..3).flat_map(|s| (0..2).flat_map(move |r| (0..2).map(move |c| (s, r, c)))) {
+            let seed = s.to_string();
+            jobs.push(job(&format!("{s}{r}{c}"), &[(SEED, s, &seed), (ROUGH, r, "r"), (COLOR, c, "c")]));
+        }
+        let plan = Plan { columns: Some(ROUGH.into()), ..Plan::default() };
+        let sheet = arrange(entries(&jobs), &plan).unwrap();
+        let titles: Vec<_> = sheet.pages.iter().map(|p| p.title.as_str()).collect();
+        assert_eq!(titles, ["render.seed = 0", "render.seed = 1", "render.seed = 2"]);
+        assert_eq!(names(&sheet.pages[2]), [["200", "210"], ["201", "211"]]);
+    }
+
+    #[test]
+    fn a_zipped_axis_is_found_by_any_of_its_paths() {
+        let jobs = [job("a", &[("material.a.roughness + material.b.roughness", 0, "x"), (SEED, 0, "0")])];
+        let plan = Plan { rows: Some("material.b.roughness".into()), ..Plan::default() };
+        assert_eq!(arrange(entries(&jobs), &plan).unwrap().columns.title, SEED);
+    }
+
+    #[test]
+    fn jobs_without_axes_and_a_lone_axis_of_rows_have_their_places() {
+        let sheet = arrange(entries(&[job("x", &[]), job("y", &[])]), &Plan::default()).unwrap();
+        assert_eq!(sheet.columns.labels, ["x", "y"]);
+        assert_eq!(names(&sheet.pages[0]), [["x", "y"]]);
+        let jobs = [job("a", &[(ROUGH, 0, "0")]), job("b", &[(ROUGH, 1, "1")])];
+        let upright = arrange(entries(&jobs), &Plan { rows: Some(ROUGH.into()), ..Plan::default() }).unwrap();
+        assert_eq!(names(&upright.pages[0]), [["a"], ["b"]]);
+    }
+
+    #[test]
+    fn what_cannot_be_arranged_is_an_error_that_says_why() {
+        assert!(matches!(arrange(Vec::new(), &Plan::default()), Err(SheetError::Empty)));
+        let two = [job("a", &[(ROUGH, 0, "0")]), job("b", &[(ROUGH, 0, "0")])];
+        let same = arrange(entries(&two), &Plan::default()).unwrap_err();
+        assert_eq!(same.to_string(), "jobs \"a\" and \"b\" have the same place on the sheet");
+        let unknown = Plan { columns: Some("roughnes".into()), ..Plan::default() };
+        let error = arrange(entries(&two[..1]), &unknown).unwrap_err().to_string();
+        assert!(error.contains("roughnes") && error.ends_with(ROUGH), "{error}");
+        let both = Plan { columns: Some(ROUGH.into()), rows: Some(ROUGH.into()), ..Plan::default() };
+        assert!(matches!(arrange(entries(&two[..1]), &both), Err(SheetError::SameAxis { .. })));
+        let torn = [job("a", &[(ROUGH, 0, "0")]), job("b", &[])];
+        assert!(matches!(arrange(entries(&torn), &Plan::default()), Err(SheetError::NoCoordinate { .. })));
+        let torn = [job("b", &[]), job("a", &[(ROUGH, 0, "0")])];
+        assert!(matches!(arrange(entries(&torn), &Plan::default()), Err(SheetError::OtherAxis { .. })));
+    }
+
+    #[test]
+    fn a_sparse_diagonal_does_not_fill_the_memory() {
+        let far = usize::MAX;
+        let jobs = [
+            job("a", &[(ROUGH, 0, "0"), (COLOR, 0, "0")]),
+            job("b", &[(ROUGH, far, "1"), (COLOR, far, "1")]),
+        ];
+        assert_eq!(
+            names(&arrange(entries(&jobs), &Plan::default()).unwrap().pages[0]),
+            [["a", "-"], ["-", "b"]]
+        );
+        let diagonal: Vec<Job> =
+            (0..600).map(|i| job(&i.to_string(), &[(ROUGH, i, ""), (COLOR, i, "")])).collect();
+        assert!(matches!(
+            arrange(entries(&diagonal), &Plan::default()),
+            Err(SheetError::TooManyCells { cells: 360_000 })
+        ));
+    }
+
+    #[test]
+    fn records_become_cells_with_the_mark_of_their_verdict() {
+        let failed = record("a", Outcome::Failed { error: "no".into() }, Verdict::NotCompared);
+        assert!(matches!(Cell::of(&failed, None), Cell::Failed { why } if why == "no"));
+        assert!(matches!(Cell::of(&record("a", Outcome::Done, Verdict::Same), None), Cell::Missing));
+        let differs = Verdict::Differs { max_error: 0.5, mean_error: 0.1, why: String::new() };
+        assert_eq!(Mark::of(&differs), Some(Mark { level: Level::Bad, text: "differs, max 0.500".into() }));
+        assert_eq!(Mark::of(&Verdict::MissingReference { path: String::new() }).unwrap().level, Level::Doubt);
+        assert_eq!(Mark::of(&Verdict::Within { max_error: 0.1, mean_error: 0.1 }), None);
+    }
 }
