@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::sheet::{Level, Mark};
 use super::table::{Summary, errors, figure, reason, seconds, word};
-use crate::record::{JobRecord, Outcome};
+use crate::record::{CrossCheck, JobRecord, Outcome};
 
 static TEMPLATE: &str = include_str!("page.html");
 
@@ -225,7 +225,6 @@ fn facts(record: &JobRecord) -> Vec<Fact> {
 }
 
 fn cross_check(record: &JobRecord) -> &'static str {
-    use crate::record::CrossCheck;
     match record.cross_check {
         CrossCheck::NotRun => "not run",
         CrossCheck::NotInstalled => "not installed",

@@ -327,13 +327,15 @@ struct Sides {
 
 impl Sides {
     fn choose(axes: &[String], plan: &Plan) -> Result<Self, SheetError> {
-        let find =
-            |side, name: &Option<String>| match name {
-                None => Ok(None),
-                Some(name) => axes.iter().position(|axis| names(axis, name)).map(Some).ok_or_else(|| {
-                    SheetError::UnknownAxis { side, axis: name.clone(), known: axes.to_vec() }
-                }),
-            };
+        let find = |side, name: &Option<String>| match name {
+            None => Ok(None),
+            Some(name) => axes
+                .iter()
+                .position(|axis| axis == name)
+                .or_else(|| axes.iter().position(|axis| is_part(axis, name)))
+                .map(Some)
+                .ok_or_else(|| SheetError::UnknownAxis { side, axis: name.clone(), known: axes.to_vec() }),
+        };
         let (columns, rows) = (find("columns", &plan.columns)?, find("rows", &plan.rows)?);
         if let (Some(c), Some(r)) = (columns, rows)
             && c == r
@@ -348,9 +350,9 @@ impl Sides {
     }
 }
 
-/// Whether `name` is the axis, or one of the paths of a zipped axis.
-fn names(axis: &str, name: &str) -> bool {
-    axis == name || axis.split([',', '+', ' ']).any(|part| part == name)
+/// Whether `name` is one of the paths of a zipped axis, as in `material.a.roughness + material.b.roughness`.
+fn is_part(axis: &str, name: &str) -> bool {
+    axis.split(" + ").any(|part| part == name)
 }
 
 /// A job's index and label on each axis.
@@ -432,7 +434,7 @@ mod tests {
 
     #[test]
     fn a_zipped_axis_is_found_by_any_of_its_paths() {
-        let jobs = [job("a", &[("material.a.roughness, material.b.roughness", 0, "x"), (SEED, 0, "0")])];
+        let jobs = [job("a", &[("material.a.roughness + material.b.roughness", 0, "x"), (SEED, 0, "0")])];
         let plan = Plan { rows: Some("material.b.roughness".into()), ..Plan::default() };
         assert_eq!(arrange(entries(&jobs), &plan).unwrap().columns.title, SEED);
     }
