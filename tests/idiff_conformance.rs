@@ -16,7 +16,7 @@ use pipeline::imagefile;
 use pipeline::math::hash::mix64;
 use pipeline::raster::{Channel, Layer, Raster, SampleType, Window};
 
-const CASES: u64 = 1200;
+const CASES: u64 = 1000;
 
 /// Random numbers of one case.
 struct Dice(u64);

@@ -17,7 +17,7 @@ pub(super) fn general(value: f64, precision: usize) -> String {
 }
 
 /// The shortest digits that give the same float back, as the fmt library prints a float: scientific below 1e-4 and from
-/// 1e7 on.
+/// 1e7 on. Of several as short it takes the nearest, and of two as near the even one; Rust's own takes the larger.
 pub(super) fn shortest(value: f32) -> String {
     if value.is_nan() {
         return if value.is_sign_negative() { "-nan" } else { "nan" }.into();
@@ -29,7 +29,11 @@ pub(super) fn shortest(value: f32) -> String {
         return if value.is_sign_negative() { "-0" } else { "0" }.into();
     }
     let scientific = format!("{value:e}");
-    let (digits, exponent) = decimal(&scientific);
+    let (mut digits, mut exponent) = decimal(&scientific);
+    let nearest = format!("{:.*e}", digits.len() - 1, f64::from(value));
+    if nearest.parse() == Ok(value) {
+        (digits, exponent) = decimal(&nearest);
+    }
     place(value < 0.0, &digits, exponent, 7)
 }
 
@@ -98,6 +102,8 @@ mod tests {
             (3e38, "3e+38"),
             (0.0001, "0.0001"),
             (0.00001, "1e-05"),
+            (1.753_906_25, "1.7539062"),
+            (-0.000_939_369_2, "-0.0009393692"),
             (f32::NEG_INFINITY, "-inf"),
             (-0.0, "-0"),
         ] {

@@ -54,13 +54,9 @@ fn equal_images_pass_with_two_lines() {
 #[test]
 fn the_holes_are_kept() {
     let plain = Thresholds::default();
-    assert_eq!(
-        verdict(&[NAN, NAN], &[0.5, 0.5], plain),
-        IdiffVerdict::Failure,
-        "from the second bad value on"
-    );
-    assert_eq!(verdict(&[NAN], &[0.5], plain), IdiffVerdict::Pass, "one alone is not counted");
-    assert_eq!(verdict(&[INF], &[0.5], plain), IdiffVerdict::Pass);
+    assert_eq!(verdict(&[NAN; 3], &[0.5; 3], plain), IdiffVerdict::Pass);
+    assert_eq!(verdict(&[INF], &[0.5], plain), IdiffVerdict::Pass, "the first is recorded, not counted");
+    assert_eq!(verdict(&[INF; 2], &[0.5; 2], plain), IdiffVerdict::Failure, "infinity over infinity is NaN");
     assert_eq!(verdict(&[NAN; 3], &[-NAN; 3], plain), IdiffVerdict::Pass);
     assert_eq!(verdict(&[INF; 3], &[-INF; 3], plain), IdiffVerdict::Pass);
 }
