@@ -1,5 +1,8 @@
 //! Source materials into Disney materials, with a note on every field: exact, carried, approximated or dropped.
 
+mod aris;
+mod mtl;
+
 use crate::record::Warning;
 use crate::scene::source::SourceMaterial;
 use crate::scene::{Material, Scene};
