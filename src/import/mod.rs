@@ -3,11 +3,12 @@
 //! An importer reads files through [`Files`], which keeps it inside the scene's folder and counts what it read, and returns an
 //! [`Imported`]: the scene with its dialect's own materials, and what was noticed on the way.
 
-//mod aris;
+mod aris;
 mod decode;
 mod files;
 mod obj;
 
+pub use aris::ArisError;
 pub use decode::ImageError;
 pub use files::{FileDigest, FileError, Files};
 pub use obj::ObjError;
