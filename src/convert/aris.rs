@@ -1,26 +1,12 @@
 //! Aris BRDFs into Disney materials.
 
 use super::{Note, Quality};
-use crate::disney::{Masking, Model, Parameter};
+use crate::disney::{DiffuseModel, Masking, Model, Parameter};
 use crate::math::Real;
 use crate::record::Warning;
 use crate::scene::Material;
 use crate::scene::material::{Param, ShadingFrame, Sides};
 use crate::scene::source::{ArisBrdf, ArisDisney, ArisMaterial};
-
-/// The names of the ten scalars in Aris' files, in the order of [`Parameter::ALL`].
-const SCALARS: [&str; 10] = [
-    "subsurface",
-    "metallic",
-    "specular",
-    "specularTint",
-    "roughness",
-    "anisotropic",
-    "sheen",
-    "sheenTint",
-    "clearcoat",
-    "clearcoatGloss",
-];
 
 /// The material `name` in Disney's terms, with a note on every field. Surfaces scatter and emit at their front alone.
 pub(super) fn convert(
@@ -38,8 +24,10 @@ pub(super) fn convert(
         ArisBrdf::Disney(disney) => {
             set_disney(&mut out, disney);
             note("color", Quality::Exact, "");
-            for (field, _) in SCALARS.into_iter().zip(disney.scalars).filter(|(_, value)| value.is_some()) {
-                note(field, Quality::Exact, "");
+            for (parameter, value) in Parameter::ALL.into_iter().zip(disney.scalars) {
+                if value.is_some() {
+                    note(ArisDisney::key(parameter), Quality::Exact, "");
+                }
             }
         }
         ArisBrdf::Diffuse { color } => {
@@ -61,7 +49,7 @@ pub(super) fn convert(
         }
         ArisBrdf::Microfacet { color, roughness, ext_ior, int_ior } => {
             out.base_color = Param::Constant(*color);
-            out.diffuse = crate::disney::DiffuseModel::Lambert;
+            out.diffuse = DiffuseModel::Lambert;
             let ks = 1.0 - color.max_channel();
             let f0 = ((int_ior - ext_ior) / (int_ior + ext_ior)).sqr();
             let specular = (ks * f0 / 0.08).min(Parameter::Specular.max());
@@ -104,7 +92,6 @@ fn set_disney(out: &mut Material, disney: &ArisDisney) {
 mod tests {
     use super::*;
     use crate::color::Rgb;
-    use crate::disney::DiffuseModel;
 
     fn converted(brdf: ArisBrdf, radiance: Option<Rgb>) -> (Material, Vec<Note>) {
         let (mut notes, mut warnings) = (Vec::new(), Vec::new());

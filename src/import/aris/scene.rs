@@ -294,16 +294,6 @@ fn read_brdf(index: usize, node: &Node, warnings: &mut Vec<Warning>) -> Result<A
     Ok(brdf)
 }
 
-/// The key of a scalar in Aris' files.
-const fn aris_key(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::SpecularTint => "specularTint",
-        Parameter::SheenTint => "sheenTint",
-        Parameter::ClearcoatGloss => "clearcoatGloss",
-        other => other.name(),
-    }
-}
-
 fn read_disney(
     config: &mut Table<'_>,
     label: &str,
@@ -313,7 +303,7 @@ fn read_disney(
     let color = reflectance(config, label)?;
     let mut scalars = [None; 10];
     for parameter in Parameter::ALL {
-        let key = aris_key(parameter);
+        let key = ArisDisney::key(parameter);
         let Some(node) = config.get(key) else {
             let what = format!("{label}.{key} is not given; {} is taken", parameter.default());
             warnings.push(Warning::new(entry.place.to_string(), what));

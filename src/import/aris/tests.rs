@@ -180,10 +180,15 @@ fn mistakes_are_told_with_place_key_and_what_was_meant() {
             "config/scene/s.yaml:17:1: the scene has no key \"widht\"; did you mean \"width\"?",
         ),
         ("width: 80\n", "", "needs the key \"width\""),
-        ("color:", "colour:", "s.yaml:6:5: brdf[0] \"diffuse\" needs the key \"color\""),
+        (
+            "color:",
+            "colour:",
+            "s.yaml:8:7: brdf[0] \"diffuse\" has no key \"colour\"; did you mean \"color\"?",
+        ),
+        ("color:", "extent:", "s.yaml:8:7: brdf[0] \"diffuse\" needs the key \"color\""),
         ("[0, 0.5, 1]", "[0, 0.5, 1.5]", "s.yaml:8:14: brdf[0].color is 1.5, but must be in [0, 1]"),
         ("[0, 0.5, 1]", "[0, 0.5]", "brdf[0].color must be a list of 3 numbers"),
-        ("[0, 0.5, 1]", "[0, 0.5, .nan]", "brdf[0].color"),
+        ("[0, 0.5, 1]", "[0, 0.5, .nan]", "config/scene/s.yaml:8:23: non-finite"),
         ("name: diffuse", "name: difuse", "did you mean \"diffuse\"?"),
         ("name: diffuse", "name: nerad", "learned while Aris trains"),
         ("data/a.obj", "data/gone.obj", "s.yaml:4:13: geometry.config.paths[0]: cannot read"),
@@ -262,9 +267,10 @@ fn damaged_scenes_never_panic() {
         let mut damaged = text.as_bytes().to_vec();
         for _ in 0..=random(2) {
             let at = random(damaged.len());
-            match random(3) {
+            match random(12) {
                 0 => damaged.truncate(at + 1),
-                1 => damaged[at] = random(256) as u8,
+                1..4 => damaged[at] = random(256) as u8,
+                4..8 => damaged[at] = b"0123456789"[random(10)],
                 _ => damaged[at] = b"0123456789-[]{}:&*.\n "[random(21)],
             }
         }

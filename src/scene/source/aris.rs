@@ -1,6 +1,7 @@
 //! Aris: a BRDF entry of a scene's YAML, and the area light on the same mesh.
 
 use crate::color::Rgb;
+use crate::disney::Parameter;
 
 /// A material: a BRDF and what the mesh emits.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,6 +55,18 @@ impl Default for ArisBrdf {
 pub struct ArisDisney {
     /// `color`, linear.
     pub color: Rgb,
-    /// The ten scalars in the order of [`crate::disney::Parameter::ALL`]; none where the file says nothing.
+    /// The ten scalars in the order of [`Parameter::ALL`]; none where the file says nothing.
     pub scalars: [Option<f32>; 10],
+}
+
+impl ArisDisney {
+    /// The key of a scalar in Aris' files.
+    pub const fn key(parameter: Parameter) -> &'static str {
+        match parameter {
+            Parameter::SpecularTint => "specularTint",
+            Parameter::SheenTint => "sheenTint",
+            Parameter::ClearcoatGloss => "clearcoatGloss",
+            other => other.name(),
+        }
+    }
 }
