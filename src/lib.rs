@@ -34,11 +34,13 @@
 //! | 5 | [`job`], [`report`] |
 //! | 4 | [`render`], [`compare`], [`output`] |
 //! | 3 | [`import`], [`convert`], [`manifest`], [`accel`], [`light`] |
-//! | 2 | [`record`], [`settings`], [`scene`], [`imagefile`] |
-//! | 1 | [`disney`], [`raster`] |
+//! | 2 | [`record`], [`scene`], [`imagefile`] |
+//! | 1 | [`disney`], [`raster`], [`settings`] |
 //! | 0 | [`math`], [`color`] |
 
 pub mod accel;
+pub mod check;
+pub mod cli;
 pub mod color;
 pub mod compare;
 pub mod convert;
@@ -56,3 +58,4 @@ pub mod render;
 pub mod report;
 pub mod scene;
 pub mod settings;
+pub mod sweep;

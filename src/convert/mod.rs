@@ -1,6 +1,8 @@
 //! Source materials into Disney materials, with a note on every field: exact, carried, approximated or dropped.
 
+mod aris;
 mod gltf;
+mod mtl;
 
 use crate::disney::{DiffuseModel, Model};
 use crate::record::Warning;
@@ -61,14 +63,8 @@ pub fn to_disney(scene: Scene<SourceMaterial>, options: &ConvertOptions) -> Conv
                 let diffuse = options.diffuse.unwrap_or_default();
                 gltf::convert(&name, source, diffuse, &mut notes, &mut warnings)
             }
-            // MERGE: `mtl::convert(&name, source, &mut notes, &mut warnings)` and the same for `aris`.
-            SourceMaterial::Mtl(_) | SourceMaterial::Aris(_) => {
-                warnings.push(Warning::new(
-                    format!("material {name:?}"),
-                    "materials of this kind are not converted by this build; it has the defaults",
-                ));
-                Material::default()
-            }
+            SourceMaterial::Mtl(source) => mtl::convert(&name, source, &mut notes, &mut warnings),
+            SourceMaterial::Aris(source) => aris::convert(&name, source, &mut notes, &mut warnings),
         };
         if let (Model::Disney, Some(diffuse)) = (material.model, options.diffuse) {
             material.diffuse = diffuse;

@@ -4,18 +4,22 @@
 //! [`Imported`]: the scene with its dialect's own materials, and what was noticed on the way. What all dialects owe the renderer
 //! (finite positions, indices in range, unique names) is seen to here, once, after the dialect is done.
 
+mod aris;
 mod files;
 mod gltf;
 mod images;
+mod obj;
 mod validate;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+pub use aris::ArisError;
 pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
-pub use images::ImageError;
+pub use images::{EnvironmentError, read_environment};
 pub use validate::InvalidScene;
+pub use obj::ObjError;
 
 use crate::record::Warning;
 use crate::scene::Scene;
@@ -92,14 +96,12 @@ pub enum ImportError {
         /// Why.
         cause: Box<GltfError>,
     },
-    /// A kind of file whose importer is not in this build.
-    #[error("{}: {dialect} files are not read by this build", path.display())]
-    Unavailable {
-        /// The file.
-        path: PathBuf,
-        /// The kind.
-        dialect: &'static str,
-    },
+    /// An OBJ file that can't be imported.
+    #[error(transparent)]
+    Obj(#[from] ObjError),
+    /// An Aris scene that can't be imported.
+    #[error(transparent)]
+    Aris(#[from] Box<ArisError>),
     /// A scene that was read but can't be rendered.
     #[error("{}: {cause}", path.display())]
     Invalid {
@@ -130,10 +132,16 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
             gltf::import(&mut files, name, &bytes, options)
                 .map_err(|cause| ImportError::Gltf { path: path.to_owned(), cause: Box::new(cause) })?
         }
-        // MERGE: `obj::import(&mut files, name, &bytes)` goes here.
-        Dialect::Obj => return Err(ImportError::Unavailable { path: path.to_owned(), dialect: "OBJ" }),
-        // MERGE: `aris::import(path)` goes here; it makes its own `Files`.
-        Dialect::Aris => return Err(ImportError::Unavailable { path: path.to_owned(), dialect: "Aris" }),
+        Dialect::Obj => {
+            let bytes = read_scene(&mut files, path, name)?;
+            obj::import(&mut files, name, &bytes)?
+        }
+        Dialect::Aris => {
+            // Its folder is the one that holds `config/`, above the scene's own.
+            let (scene, warnings, of_config) = aris::import(path).map_err(Box::new)?;
+            files = of_config;
+            (scene, warnings)
+        }
     };
     validate::validate(&mut scene, name, &mut warnings)
         .map_err(|cause| ImportError::Invalid { path: path.to_owned(), cause })?;

@@ -32,6 +32,8 @@ pub struct PlannedJob {
     pub identity: String,
     /// The same without the executable (hex).
     pub key: String,
+    /// What was noticed about the images that overrides name.
+    pub warnings: Vec<Warning>,
 }
 
 /// Where results go and what they are compared with.
@@ -74,14 +76,16 @@ pub fn plan(job: &Job, loaded: &LoadedScene, build: &Build) -> Result<PlannedJob
     let mut scene = (*loaded.scene).clone();
     let mut settings = job.settings.clone();
     let mut images: Vec<FileDigest> = Vec::new();
+    let mut warnings: Vec<Warning> = Vec::new();
     edit::apply_all(&mut scene, &mut settings, &job.overrides, &mut |path| {
-        let (image, digest) = read_environment(path)?;
+        let (image, digest, replaced) = read_environment(path)?;
         images.push(digest);
+        warnings.extend(replaced);
         Ok(image)
     })?;
     let files: Vec<&FileDigest> = loaded.files.iter().chain(&images).collect();
     let (identity, key) = identify(job, &files, &settings, build);
-    Ok(PlannedJob { job: job.clone(), scene: Arc::new(scene), settings, identity, key })
+    Ok(PlannedJob { job: job.clone(), scene: Arc::new(scene), settings, identity, key, warnings })
 }
 
 /// The record of an earlier run of the same identity whose image is still what it was; nothing otherwise.
@@ -108,7 +112,7 @@ pub fn run(
     let mut record = blank_record(&planned.job, build, &destination.folder);
     record.identity.clone_from(&planned.identity);
     record.key.clone_from(&planned.key);
-    record.warnings.clone_from(&loaded.warnings);
+    record.warnings = loaded.warnings.iter().chain(&planned.warnings).cloned().collect();
     if let Err(error) = attempt(planned, loaded, build, destination, control, &mut record) {
         record.outcome = Outcome::Failed { error: error.to_string() };
     }

@@ -4,10 +4,12 @@
 
 pub mod camera;
 pub mod environment;
+pub mod framing;
 pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod source;
+pub mod studio;
 pub mod texture;
 
 use std::sync::Arc;

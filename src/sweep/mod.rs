@@ -14,7 +14,7 @@ pub use present::Presentation;
 pub use run::{Observer, Options, Shard, Silent, run};
 
 /// What a sweep came to.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct SweepResult {
     /// One a job of this run, in the manifest's order.
     pub records: Vec<JobRecord>,

@@ -1,6 +1,7 @@
 //! Why a glTF file can't be imported.
 
-use crate::import::{FileError, ImageError};
+use crate::imagefile::ImageFileError;
+use crate::import::FileError;
 
 /// Why a glTF file can't be imported. Elements are named as in the file's JSON, such as `meshes[0].primitives[1]`.
 #[derive(Debug, thiserror::Error)]
@@ -180,7 +181,7 @@ pub enum GltfError {
     },
     /// An image that can't be used.
     #[error(transparent)]
-    Image(#[from] ImageError),
+    Image(#[from] ImageFileError),
 }
 
 /// What is wrong with a `uri`.

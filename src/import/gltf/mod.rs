@@ -58,7 +58,9 @@ pub(super) fn import(
     let mut scene = Scene::empty();
     let mut textures = Textures::new(root, &buffers, files);
     let materials = read_materials(root, &mut textures)?;
-    (scene.textures, scene.images) = textures.finish();
+    let replaced;
+    (scene.textures, scene.images, replaced) = textures.finish();
+    warnings.extend(replaced);
 
     let geometry = Geometry::new(Accessors::new(root, &buffers), name);
     let mut stage = Stage {

@@ -16,6 +16,7 @@ use super::uri::Target;
 use crate::import::Files;
 use crate::import::images::decode_image;
 use crate::math::Real;
+use crate::record::Warning;
 use crate::scene::material::{TextureChannel, TextureMap};
 use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
 use crate::scene::{Image, ImageId, Texture, TextureId};
@@ -59,6 +60,7 @@ pub(super) struct Textures<'a> {
     by_source: BTreeMap<usize, ImageId>,
     by_use: BTreeMap<(usize, bool), TextureId>,
     decoded: u64,
+    warnings: Vec<Warning>,
 }
 
 impl<'a> Textures<'a> {
@@ -73,12 +75,13 @@ impl<'a> Textures<'a> {
             by_source: BTreeMap::new(),
             by_use: BTreeMap::new(),
             decoded: 0,
+            warnings: Vec::new(),
         }
     }
 
-    /// What was made.
-    pub(super) fn finish(self) -> (Vec<Texture>, Vec<Arc<Image>>) {
-        (self.textures, self.images)
+    /// What was made, and what was noticed.
+    pub(super) fn finish(self) -> (Vec<Texture>, Vec<Arc<Image>>, Vec<Warning>) {
+        (self.textures, self.images, self.warnings)
     }
 
     /// The texture of `slot`, whose values mean `encoding`, as `element` uses it.
@@ -142,7 +145,7 @@ impl<'a> Textures<'a> {
         let json = lookup(&self.root.images, index, element, "images")?;
         let element = format!("images[{index}]");
         let name = |fallback: &str| json.name.clone().unwrap_or_else(|| fallback.to_owned());
-        let image = match (&json.uri, json.buffer_view) {
+        let (image, replaced) = match (&json.uri, json.buffer_view) {
             (_, Some(view)) => {
                 let (bytes, _) = self.buffers.view(self.root, view.value(), &element)?;
                 decode_image(bytes, &name(&element))?
@@ -153,6 +156,7 @@ impl<'a> Textures<'a> {
             },
             (None, None) => return Err(GltfError::Missing { element, property: "uri or bufferView" }),
         };
+        self.warnings.extend(replaced);
         self.decoded = self.decoded.saturating_add(match &image.pixels {
             Pixels::U8(v) => v.len() as u64,
             Pixels::U16(v) => v.len() as u64 * 2,

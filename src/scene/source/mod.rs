@@ -4,9 +4,9 @@ mod aris;
 mod gltf;
 mod mtl;
 
-pub use aris::ArisMaterial;
+pub use aris::{ArisBrdf, ArisDisney, ArisMaterial};
 pub use gltf::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
-pub use mtl::MtlMaterial;
+pub use mtl::{MtlMap, MtlMaterial, MtlSlot};
 
 /// A material as its file describes it.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,142 @@
+//! The command line: one file a command. Arguments as typed become a checked configuration, one call does the work, and the
+//! result is printed: data to stdout, talk to stderr.
+
+mod accept;
+mod completions;
+mod diff;
+mod progress;
+mod render;
+mod schema;
+mod sweep;
+
+use std::error::Error;
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Everything is well.
+const WELL: u8 = 0;
+/// Images differ.
+const DIFFERENT: u8 = 1;
+/// An error.
+const FAILED: u8 = 2;
+/// The arguments are wrong.
+const USAGE: u8 = 64;
+
+/// What a command ends with.
+type Outcome = Result<u8, Box<dyn Error>>;
+
+/// Scene conversion and batch rendering with a Disney path tracer.
+#[derive(Debug, Parser)]
+#[command(
+    name = "pipeline",
+    version,
+    arg_required_else_help = true,
+    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline sweep configs/roughness.toml\n  pipeline diff a.exr b.exr\n\nExit codes: 0 well, 1 images differ, 2 an error, 64 wrong arguments."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Threads to work with; all processors where absent. Results do not depend on it.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// No progress and no remarks, only results and errors.
+    #[arg(short, long, global = true)]
+    quiet: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(render::Arguments),
+    Sweep(sweep::Arguments),
+    Accept(accept::Arguments),
+    Diff(diff::Arguments),
+    Schema(schema::Arguments),
+    Completions(completions::Arguments),
+}
+
+/// Runs the command line and tells how it ended.
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            let is_error = error.use_stderr();
+            // Nothing is left to tell it to if this fails.
+            let _ = error.print();
+            return ExitCode::from(if is_error { USAGE } else { WELL });
+        }
+    };
+    match run(&arguments) {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => {
+            tell(&format!("error: {error}"));
+            ExitCode::from(FAILED)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Outcome {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+    }
+    let talk = if arguments.quiet { Talk::Quiet } else { Talk::Normal };
+    match &arguments.command {
+        Command::Render(command) => render::run(command, talk),
+        Command::Sweep(command) => sweep::run(command, talk),
+        Command::Accept(command) => accept::run(command, talk),
+        Command::Diff(command) => diff::run(command),
+        Command::Schema(command) => schema::run(command),
+        Command::Completions(command) => completions::run(command),
+    }
+}
+
+/// How much is said on stderr.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Talk {
+    Normal,
+    Quiet,
+}
+
+impl Talk {
+    /// Says something, unless nothing is to be said.
+    fn say(self, text: &str) {
+        if self == Self::Normal {
+            tell(text);
+        }
+    }
+}
+
+/// A line to stderr. A closed stderr is no reason to stop.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", text.trim_end());
+}
+
+/// Text to stdout. A reader that has gone away, as `head` does, ends the output and is no error.
+fn print(text: &str) -> Result<(), std::io::Error> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_has_an_example() {
+        use clap::CommandFactory;
+        for command in Arguments::command().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains("Example"), "{}", command.get_name());
+        }
+    }
+}

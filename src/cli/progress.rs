@@ -1,0 +1,97 @@
+//! Progress bars, on a terminal alone.
+
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::Talk;
+use crate::render::Control;
+
+/// Steps of the bar a job has: its samples move it smoothly.
+const STEPS: u64 = 1000;
+/// Between two looks at a running render.
+const INTERVAL: Duration = Duration::from_millis(100);
+
+/// A bar over some jobs, which follows the samples of the one that runs.
+pub(super) struct Progress {
+    bar: ProgressBar,
+    done: u64,
+    follower: Option<Follower>,
+}
+
+struct Follower {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<()>,
+}
+
+impl Progress {
+    /// A bar for `jobs` jobs; nothing is shown if stderr is not a terminal or nothing is to be said.
+    pub(super) fn new(jobs: usize, talk: Talk) -> Self {
+        let shown = talk == Talk::Normal && std::io::stderr().is_terminal();
+        let bar = if shown { ProgressBar::new(jobs as u64 * STEPS) } else { ProgressBar::hidden() };
+        let template = "{prefix} {bar:32} {percent:>3}%  {msg}  {elapsed} elapsed, {eta} left";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style.progress_chars("━╸─"));
+        }
+        Self { bar, done: 0, follower: None }
+    }
+
+    /// Follows a render until [`Self::finish_job`].
+    pub(super) fn follow(&mut self, name: &str, control: &Arc<Control>) {
+        if self.bar.is_hidden() {
+            return;
+        }
+        self.bar.set_prefix(name.to_owned());
+        let stop = Arc::new(AtomicBool::new(false));
+        let (bar, control, done, stopped) =
+            (self.bar.clone(), Arc::clone(control), self.done, Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            while !stopped.load(Ordering::Relaxed) {
+                let (paths, total) =
+                    (control.paths.load(Ordering::Relaxed), control.total_paths.load(Ordering::Relaxed));
+                if total > 0 {
+                    bar.set_position(done * STEPS + paths.min(total) * STEPS / total);
+                    bar.set_message(format!("{:.1} of {:.1} M samples", paths as f64 * 1e-6, total as f64 * 1e-6));
+                }
+                std::thread::park_timeout(INTERVAL);
+            }
+        });
+        self.follower = Some(Follower { stop, thread });
+    }
+
+    /// A job is done. Work that was not done now does not count for the time left.
+    pub(super) fn finish_job(&mut self, reused: bool) {
+        self.stop_following();
+        if reused {
+            self.bar.dec_length(STEPS);
+        } else {
+            self.done += 1;
+            self.bar.set_position(self.done * STEPS);
+        }
+    }
+
+    /// A line above the bar.
+    pub(super) fn say(&self, talk: Talk, text: &str) {
+        self.bar.suspend(|| talk.say(text));
+    }
+
+    fn stop_following(&mut self) {
+        if let Some(Follower { stop, thread }) = self.follower.take() {
+            stop.store(true, Ordering::Relaxed);
+            thread.thread().unpark();
+            // It only draws; if that failed there is nothing to add.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.stop_following();
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,275 @@
+//! `pipeline render`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::progress::Progress;
+use super::{Outcome, Talk, WELL, print};
+use crate::convert::ConvertOptions;
+use crate::disney::DiffuseModel;
+use crate::imagefile;
+use crate::import::{ImportOptions, LightUnits};
+use crate::job::{self, Build, LoadedScene, PlannedJob};
+use crate::output::{Provenance, stamp, tone};
+use crate::raster::Raster;
+use crate::record::{Job, Override, Value};
+use crate::render::{Control, Prepared, RenderError, render, replay};
+use crate::settings::{Display, Filter, RenderSettings, ToneCurve};
+
+/// Render a scene: glTF, OBJ, or an Aris YAML scene.
+///
+/// The result is an EXR of two parts, the picture and its data (albedo, normal, depth, variance, samples), or a PNG if the
+/// output's name ends so.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline render scenes/shaderball.glb -o ball.png --spp 256 --set material.ball.roughness=0.1\n  pipeline render model.obj -o model.exr --width 800 --set environment.rotation=90\n  pipeline render scenes/shaderball.glb --pixel 320,240 --sample 3"
+)]
+pub(super) struct Arguments {
+    /// The scene.
+    scene: PathBuf,
+    /// The image to write, .exr or .png.
+    #[arg(short, long, value_name = "FILE", required_unless_present = "pixel")]
+    output: Option<PathBuf>,
+    /// Set a path of the scene, as in a manifest: material.NAME.FIELD, camera.FIELD, light.NAME.FIELD, environment.FIELD.
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
+    set: Vec<Override>,
+    /// Samples a pixel.
+    #[arg(long, value_name = "N")]
+    spp: Option<u32>,
+    /// Columns.
+    #[arg(long, value_name = "PIXELS")]
+    width: Option<u32>,
+    /// Rows.
+    #[arg(long, value_name = "PIXELS")]
+    height: Option<u32>,
+    /// The seed.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// The largest number of scattering events.
+    #[arg(long, value_name = "N")]
+    max_depth: Option<u32>,
+    /// Independent sample sets a pixel, for the variance.
+    #[arg(long, value_name = "N")]
+    replicates: Option<u32>,
+    /// The camera, by name.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// The pixel filter.
+    #[arg(long, value_name = "FILTER", value_parser = parse_enum::<Filter>)]
+    filter: Option<Filter>,
+    /// The diffuse term of Disney materials: burley, lambert or lambert_fresnel.
+    #[arg(long, value_name = "MODEL", value_parser = parse_enum::<DiffuseModel>)]
+    diffuse: Option<DiffuseModel>,
+    /// Read glTF's punctual lights as Blender does: divided by 683.
+    #[arg(long)]
+    blender_lights: bool,
+    /// The tone curve of a PNG: neutral, srgb or agx.
+    #[arg(long, value_name = "CURVE", value_parser = parse_enum::<ToneCurve>, default_value = "neutral")]
+    tone: ToneCurve,
+    /// The exposure of a PNG in stops.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f32,
+    /// Trace one pixel's path again and tell where it goes, instead of rendering.
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, conflicts_with = "output", requires = "sample")]
+    pixel: Option<(u32, u32)>,
+    /// Which of the pixel's samples.
+    #[arg(long, value_name = "N", requires = "pixel")]
+    sample: Option<u32>,
+}
+
+/// A value of an enum by its name in files.
+fn parse_enum<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+    serde_json::from_value(serde_json::Value::String(text.to_owned())).map_err(|error| error.to_string())
+}
+
+fn parse_pixel(text: &str) -> Result<(u32, u32), String> {
+    let pixel = text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    pixel.ok_or_else(|| format!("{text:?} is not a pixel; two whole numbers are expected, such as 320,240"))
+}
+
+/// `PATH=VALUE`, the value as in TOML; what isn't TOML is text.
+fn parse_override(text: &str) -> Result<Override, String> {
+    let (path, value) = text.split_once('=').ok_or_else(|| format!("{text:?} is not PATH=VALUE"))?;
+    let document = format!("v = {}", value.trim());
+    let value = match document.parse::<toml::Table>() {
+        Ok(mut table) => table.remove("v").and_then(from_toml).ok_or_else(|| format!("{text:?}: a table or a date is no value"))?,
+        Err(_) => Value::Text(value.trim().to_owned()),
+    };
+    Ok(Override { path: path.trim().to_owned(), value })
+}
+
+fn from_toml(value: toml::Value) -> Option<Value> {
+    Some(match value {
+        toml::Value::Boolean(b) => Value::Bool(b),
+        toml::Value::Integer(i) => Value::Number(i as f64),
+        toml::Value::Float(f) => Value::Number(f),
+        toml::Value::String(s) => Value::Text(s),
+        toml::Value::Array(items) => Value::List(items.into_iter().map(from_toml).collect::<Option<_>>()?),
+        toml::Value::Table(_) | toml::Value::Datetime(_) => return None,
+    })
+}
+
+pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
+    // Before minutes are spent on an image that can't be kept.
+    let format = arguments.output.as_deref().map(Format::of).transpose()?;
+    let import_options = ImportOptions {
+        light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
+    };
+    let loaded = job::load(&arguments.scene, &import_options, &ConvertOptions { diffuse: arguments.diffuse })?;
+    let build = Build::current()?;
+    let planned = job::plan(&described(arguments), &loaded, &build)?;
+    for warning in loaded.warnings.iter().chain(&planned.warnings) {
+        talk.say(&format!("warning: {warning}"));
+    }
+    let prepared = Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
+    if let (Some((x, y)), Some(sample)) = (arguments.pixel, arguments.sample) {
+        return tell_path(&prepared, &planned, x, y, sample);
+    }
+    let mut rendered = render_with_progress(&prepared, &planned, &loaded, talk)?;
+    stamp(
+        &mut rendered,
+        &Provenance {
+            identity: &planned.identity,
+            key: &planned.key,
+            job: &planned.job,
+            settings: &planned.settings,
+            build: build.version,
+            feature_level: build.feature_level,
+        },
+    );
+    if let (Some(output), Some(format)) = (&arguments.output, format) {
+        write(output, format, &rendered, &Display { tone: arguments.tone, exposure: arguments.exposure })?;
+    }
+    Ok(WELL)
+}
+
+/// The job that the arguments describe.
+fn described(arguments: &Arguments) -> Job {
+    let default = RenderSettings::default();
+    let settings = RenderSettings {
+        width: arguments.width,
+        height: arguments.height,
+        spp: arguments.spp.unwrap_or(default.spp),
+        seed: arguments.seed.unwrap_or(default.seed),
+        max_depth: arguments.max_depth.unwrap_or(default.max_depth),
+        replicates: arguments.replicates.unwrap_or(default.replicates),
+        filter: arguments.filter.unwrap_or(default.filter),
+        camera: arguments.camera.clone(),
+        ..default
+    };
+    let stem = arguments.scene.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    Job {
+        name: stem,
+        scene: arguments.scene.clone(),
+        overrides: arguments.set.clone(),
+        settings,
+        coordinates: Vec::new(),
+    }
+}
+
+/// Renders, and says how it went.
+fn render_with_progress(
+    prepared: &Prepared,
+    planned: &PlannedJob,
+    loaded: &LoadedScene,
+    talk: Talk,
+) -> Result<Raster, RenderError> {
+    let start = Instant::now();
+    let control = Arc::new(Control::default());
+    let mut progress = Progress::new(1, talk);
+    progress.follow(&planned.job.name, &control);
+    let rendered = render(prepared, &control)?;
+    drop(progress);
+    let seconds = start.elapsed().as_secs_f64();
+    let (width, height) = prepared.size();
+    let counts = &rendered.counts;
+    talk.say(&format!(
+        "{width} × {height}, {} samples a pixel, {} triangles, {seconds:.1} s, {:.2} M rays/s",
+        planned.settings.spp,
+        loaded.geometry.triangle_count(),
+        counts.rays as f64 * 1e-6 / seconds.max(1e-9),
+    ));
+    for skipped in prepared.skipped() {
+        talk.say(&format!("skipped: {skipped}"));
+    }
+    if let Some(bad) = counts.first_bad_samples.first() {
+        talk.say(&format!(
+            "warning: {} samples were not finite or negative and were dropped; the first: --pixel {},{} --sample {}",
+            counts.bad_samples, bad.x, bad.y, bad.sample
+        ));
+    }
+    Ok(rendered.raster)
+}
+
+/// What an image is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Exr,
+    Png,
+}
+
+impl Format {
+    /// By the file's ending.
+    fn of(path: &Path) -> Result<Self, String> {
+        match path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).as_deref() {
+            Some("exr") => Ok(Self::Exr),
+            Some("png") => Ok(Self::Png),
+            _ => Err(format!("{}: images are written as .exr or .png", path.display())),
+        }
+    }
+}
+
+fn write(path: &Path, format: Format, raster: &Raster, display: &Display) -> Outcome {
+    let layer = raster.picture();
+    match (format, layer.rgb()) {
+        (Format::Png, Some(rgb)) => {
+            imagefile::write_png(path, layer.window.width, layer.window.height, &tone::to_srgb8(rgb, display))?;
+        }
+        _ => {
+            imagefile::write_exr(path, raster)?;
+        }
+    }
+    Ok(WELL)
+}
+
+fn tell_path(prepared: &Prepared, planned: &PlannedJob, x: u32, y: u32, sample: u32) -> Outcome {
+    let (width, height) = prepared.size();
+    if x >= width || y >= height || sample >= planned.settings.spp {
+        return Err(format!(
+            "the image has {width} × {height} pixels of {} samples; there is no sample {sample} of pixel {x},{y}",
+            planned.settings.spp
+        )
+        .into());
+    }
+    let path = replay(prepared, x, y, sample);
+    let mut text = String::new();
+    for (i, v) in path.vertices.iter().enumerate() {
+        let [px, py, pz] = v.point;
+        let (beta, radiance) = (v.beta.to_array(), v.radiance.to_array());
+        text += &format!("{:>3}  at ({px}, {py}, {pz})  beta {beta:?}  radiance so far {radiance:?}\n", i + 1);
+    }
+    print(&format!("{text}radiance {:?}\n", path.radiance.to_array()))?;
+    Ok(WELL)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overrides_read_toml_values_and_plain_words() {
+        let value = |text: &str| parse_override(text).map(|o| o.value);
+        assert_eq!(value("a.b=0.5"), Ok(Value::Number(0.5)));
+        assert_eq!(value("a.b = 1"), Ok(Value::Number(1.0)));
+        assert_eq!(value("a.b=mirror"), Ok(Value::Text("mirror".into())));
+        assert_eq!(value("a.b=[1, 0.5, 0]"), Ok(Value::List([1.0, 0.5, 0.0].map(Value::Number).to_vec())));
+        assert!(parse_override("a.b").is_err());
+    }
+
+    #[test]
+    fn pixels_are_two_whole_numbers() {
+        assert_eq!(parse_pixel("3, 4"), Ok((3, 4)));
+        assert!(parse_pixel("3;4").is_err() && parse_pixel("-1,2").is_err());
+    }
+}

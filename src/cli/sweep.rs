@@ -1,0 +1,166 @@
+//! `pipeline sweep`.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::progress::Progress;
+use super::{DIFFERENT, FAILED, Outcome, Talk, WELL, print};
+use crate::record::{Job, JobRecord, Outcome as JobOutcome, Verdict};
+use crate::render::Control;
+use crate::report::{TableOptions, verdict_table};
+use crate::sweep::{self, Observer, Options, Shard, Sweep, SweepError};
+
+/// Render all jobs of a manifest, compare them with their references, and make a contact sheet.
+///
+/// Results go to outputs/NAME: an EXR and a JSON record for each job, sheet.png, sheet.exr and index.html. Jobs that are done
+/// are not rendered again; a sweep that was stopped goes on where it was.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  pipeline sweep configs/roughness.toml\n  pipeline sweep configs/roughness.toml --list\n  pipeline sweep configs/roughness.toml --shard 1/2 -o /results"
+)]
+pub(super) struct Arguments {
+    /// The manifest, a TOML file.
+    manifest: PathBuf,
+    /// The folder of results, instead of the manifest's.
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Print the jobs' names, one a line, and do nothing.
+    #[arg(long, conflicts_with = "dry_run")]
+    list: bool,
+    /// Print each job with all that it sets, and do nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Render again what is already there.
+    #[arg(long)]
+    force: bool,
+    /// Stop after the first job that fails.
+    #[arg(long)]
+    fail_fast: bool,
+    /// Only part I of N of the jobs; all machines split them alike.
+    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    shard: Option<Shard>,
+    /// OpenImageIO's idiff, to confirm comparisons with; the one on PATH where absent.
+    #[arg(long, value_name = "PROGRAM")]
+    idiff: Option<PathBuf>,
+}
+
+fn parse_shard(text: &str) -> Result<Shard, String> {
+    let wrong = || format!("{text:?} is not I/N with 1 ≤ I ≤ N, such as 1/4");
+    let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+    let shard = Shard { index: index.parse().map_err(|_| wrong())?, count: count.parse().map_err(|_| wrong())? };
+    if (1..=shard.count).contains(&shard.index) { Ok(shard) } else { Err(wrong()) }
+}
+
+pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
+    let sweep = sweep::open(&arguments.manifest)?;
+    if arguments.list {
+        let names: String = sweep.jobs.iter().map(|job| format!("{}\n", job.name)).collect();
+        print(&names)?;
+        return Ok(WELL);
+    }
+    if arguments.dry_run {
+        print(&described(&sweep))?;
+        return Ok(WELL);
+    }
+    let count = sweep.jobs.len();
+    talk.say(&format!("{}: {count} {}", sweep.manifest.name, if count == 1 { "job" } else { "jobs" }));
+    let options = Options {
+        folder: arguments.output.clone(),
+        force: arguments.force,
+        fail_fast: arguments.fail_fast,
+        shard: arguments.shard,
+        idiff: arguments.idiff.clone(),
+    };
+    let mut watcher = Watcher { progress: Progress::new(count, talk), talk, said: Vec::new() };
+    let result = sweep::run(&sweep, &options, &mut watcher)?;
+    drop(watcher);
+
+    let records: Vec<&JobRecord> = result.records.iter().collect();
+    let width = terminal_width();
+    print(&verdict_table(&records, &TableOptions { width, reused: result.reused }))?;
+    match &result.presentation {
+        Ok(presentation) => {
+            for sheet in &presentation.sheets {
+                talk.say(&format!("sheet: {}", sheet.display()));
+            }
+            talk.say(&format!("page:  {}", presentation.page.display()));
+        }
+        // Without a job in this shard there is nothing to show.
+        Err(SweepError::Sheet(crate::report::SheetError::Empty)) => {}
+        Err(error) => {
+            super::tell(&format!("error: the sheet could not be made: {error}"));
+            return Ok(FAILED);
+        }
+    }
+    Ok(result.records.iter().map(exit_code).max().unwrap_or(WELL))
+}
+
+/// An error beats a difference.
+fn exit_code(record: &JobRecord) -> u8 {
+    match (&record.outcome, &record.verdict) {
+        (JobOutcome::Failed { .. }, _) | (_, Verdict::Error { .. } | Verdict::MissingReference { .. }) => FAILED,
+        (JobOutcome::Done, verdict) if verdict.passes() => WELL,
+        (JobOutcome::Done, _) => DIFFERENT,
+    }
+}
+
+fn described(sweep: &Sweep) -> String {
+    let mut text = String::new();
+    for job in &sweep.jobs {
+        let settings = &job.settings;
+        text += &format!("{}\n  scene = {}\n", job.name, job.scene.display());
+        for o in &job.overrides {
+            text += &format!("  {} = {}\n", o.path, o.value);
+        }
+        text += &format!("  samples = {}, seed = {}, max_depth = {}\n", settings.spp, settings.seed, settings.max_depth);
+    }
+    text + &format!("{} jobs into {}\n", sweep.jobs.len(), sweep.folder.display())
+}
+
+/// The width of the terminal that stdout is; none for a file or a pipe.
+fn terminal_width() -> Option<u16> {
+    terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| width.0)
+}
+
+struct Watcher {
+    progress: Progress,
+    talk: Talk,
+    said: Vec<crate::record::Warning>,
+}
+
+impl Observer for Watcher {
+    fn started(&mut self, job: &Job, control: &Arc<Control>) {
+        self.progress.follow(&job.name, control);
+    }
+
+    fn finished(&mut self, record: &JobRecord, reused: bool) {
+        self.progress.finish_job(reused);
+        if let JobOutcome::Failed { error } = &record.outcome {
+            self.progress.say(self.talk, &format!("{}: FAILED: {error}", record.job.name));
+        }
+        // A scene's warnings come with each of its jobs; once is enough.
+        for warning in &record.warnings {
+            if !self.said.contains(warning) {
+                self.progress.say(self.talk, &format!("warning: {warning}"));
+                self.said.push(warning.clone());
+            }
+        }
+    }
+
+    fn left_out(&mut self, _: &Job) {
+        self.progress.finish_job(true);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_one_of_some() {
+        assert_eq!(parse_shard("2/3"), Ok(Shard { index: 2, count: 3 }));
+        for wrong in ["0/3", "4/3", "1", "a/b", "1/0", "-1/2"] {
+            assert!(parse_shard(wrong).is_err(), "{wrong}");
+        }
+    }
+}

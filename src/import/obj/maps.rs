@@ -1,0 +1,176 @@
+//! Finding and loading the files that an OBJ or MTL names: beside it, as exporters of all systems write them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::import::Files;
+use crate::import::images::decode_image;
+use crate::record::Warning;
+use crate::scene::source::{MtlMaterial, MtlSlot};
+use crate::scene::texture::{Encoding, TexelFilter, Wrap};
+use crate::scene::{Image, ImageId, Texture, TextureId};
+
+/// A file that was found.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Found {
+    /// Its name inside the scene's folder.
+    pub name: String,
+    /// Whether the folders that were named had to be ignored.
+    pub elsewhere: bool,
+}
+
+/// Looks for what a file in `folder` (inside the scene's) calls `written`: quotes stripped, backslashes turned, case ignored
+/// where there is no exact match, and at last, for paths of another machine, by the file's name alone.
+pub(super) fn find(files: &Files, folder: &str, written: &str) -> Option<Found> {
+    let slashed = written.trim().trim_matches(['"', '\'']).replace('\\', "/");
+    let parts: Vec<&str> = slashed.split('/').filter(|part| !part.is_empty() && *part != ".").collect();
+    let last = *parts.last()?;
+    let inside = !slashed.starts_with('/') && !parts[0].ends_with(':');
+    let named = inside.then(|| collapse(folder, &parts)).flatten();
+    let named = named.and_then(|parts| exact_or_any_case(files, &parts));
+    if let Some(name) = named {
+        return Some(Found { name, elsewhere: false });
+    }
+    let beside = collapse(folder, &[last]).and_then(|parts| exact_or_any_case(files, &parts))?;
+    Some(Found { name: beside, elsewhere: true })
+}
+
+/// The parts of a path below the scene's folder, `..` resolved; none if it leads outside.
+fn collapse<'a>(folder: &'a str, parts: &[&'a str]) -> Option<Vec<&'a str>> {
+    let mut path = Vec::new();
+    for part in folder.split('/').filter(|part| !part.is_empty() && *part != ".").chain(parts.iter().copied())
+    {
+        if part == ".." {
+            path.pop()?;
+        } else {
+            path.push(part);
+        }
+    }
+    Some(path)
+}
+
+fn exact_or_any_case(files: &Files, parts: &[&str]) -> Option<String> {
+    let exact = parts.join("/");
+    if files.exists(&exact) {
+        return Some(exact);
+    }
+    let mut found = String::new();
+    for part in parts {
+        let entries = std::fs::read_dir(files.root().join(&found)).ok()?;
+        let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        // The smallest, so that the order of the folder does not matter.
+        let name = names.filter(|name| name.to_lowercase() == part.to_lowercase()).min()?;
+        if !found.is_empty() {
+            found.push('/');
+        }
+        found.push_str(&name);
+    }
+    files.exists(&found).then_some(found)
+}
+
+/// The images and textures of a scene, each loaded once.
+#[derive(Debug, Default)]
+pub(super) struct Maps {
+    pub images: Vec<Arc<Image>>,
+    pub textures: Vec<Texture>,
+    by_file: BTreeMap<String, Option<ImageId>>,
+}
+
+impl Maps {
+    /// Loads the maps of a material that the conversion reads. One that is missing or unreadable is told and left out.
+    pub(super) fn load(
+        &mut self,
+        files: &mut Files,
+        folder: &str,
+        material: &mut MtlMaterial,
+        warnings: &mut Vec<Warning>,
+    ) {
+        let library = material.library.clone();
+        for (slot, map) in material.maps.iter_mut().filter(|(slot, _)| slot.is_read()) {
+            let place = format!("{library}:{}", map.line);
+            let mut warn = |message: String| warnings.push(Warning::new(place.clone(), message));
+            let Some(found) = find(files, folder, &map.file) else {
+                warn(format!("{} {:?} is not there; left out", slot.statement(), map.file));
+                continue;
+            };
+            if found.elsewhere {
+                warn(format!("{:?} is not there; {:?} is taken", map.file, found.name));
+            }
+            let Some(image) = self.image(files, &found.name, &mut warn) else { continue };
+            map.has_alpha = matches!(self.images[image.0 as usize].channels, 2 | 4);
+            map.texture = Some(self.texture(image, encoding(*slot), map.wrap));
+        }
+    }
+
+    fn image(&mut self, files: &mut Files, name: &str, warn: &mut impl FnMut(String)) -> Option<ImageId> {
+        if let Some(&known) = self.by_file.get(name) {
+            return known;
+        }
+        let next = ImageId(self.images.len() as u32);
+        let loaded = match files.read(name) {
+            Ok(bytes) => match decode_image(&bytes, name) {
+                Ok((image, replaced)) => {
+                    replaced.into_iter().for_each(|w| warn(w.message));
+                    Some(image)
+                }
+                Err(error) => {
+                    warn(format!("{error}; the map is left out"));
+                    None
+                }
+            },
+            Err(error) => {
+                warn(format!("{error}; the map is left out"));
+                None
+            }
+        };
+        let id = loaded.map(|image| {
+            self.images.push(Arc::new(image));
+            next
+        });
+        self.by_file.insert(name.to_owned(), id);
+        id
+    }
+
+    fn texture(&mut self, image: ImageId, encoding: Encoding, wrap: Wrap) -> TextureId {
+        let texture = Texture { image, encoding, wrap: [wrap; 2], filter: TexelFilter::Bilinear };
+        let at = self.textures.iter().position(|t| *t == texture).unwrap_or_else(|| {
+            self.textures.push(texture);
+            self.textures.len() - 1
+        });
+        TextureId(at as u32)
+    }
+}
+
+/// Colours are encoded as displays want them, everything else holds numbers.
+const fn encoding(slot: MtlSlot) -> Encoding {
+    match slot {
+        MtlSlot::Kd | MtlSlot::Ke => Encoding::Srgb,
+        _ => Encoding::Linear,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_found_as_other_systems_write_them() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(folder.path().join("models/Tex")).unwrap();
+        std::fs::write(folder.path().join("models/Tex/Wood A.PNG"), "x").unwrap();
+        std::fs::write(folder.path().join("models/stone.png"), "x").unwrap();
+        let files = Files::new(folder.path()).unwrap();
+        let name = |written: &str| find(&files, "models", written).map(|f| (f.name, f.elsewhere));
+        let wood = Some(("models/Tex/Wood A.PNG".to_owned(), false));
+        for written in ["Tex/Wood A.PNG", "\"tex\\wood a.png\"", "./TEX//wood a.png", "tex/../Tex/Wood A.PNG"]
+        {
+            assert_eq!(name(written), wood, "{written}");
+        }
+        let stone = Some(("models/stone.png".to_owned(), true));
+        for written in ["C:\\art\\STONE.png", "/home/me/stone.png", "../../../stone.png", "gone/stone.png"] {
+            assert_eq!(name(written), stone, "{written}");
+        }
+        assert_eq!(name("none.png"), None);
+        assert_eq!(name(""), None);
+    }
+}
