@@ -110,9 +110,8 @@ mod tests {
         let read = decode_image(&png(&eight.into()), "a").unwrap();
         assert_eq!((read.width, read.height, read.channels), (1, 2, 2));
         assert_eq!(read.pixels, Pixels::U8(vec![1, 2, 3, 4]));
-        let sixteen = DynamicImage::ImageRgb16(
-            image::ImageBuffer::from_raw(1, 1, vec![1u16, 40000, 65535]).unwrap(),
-        );
+        let sixteen =
+            DynamicImage::ImageRgb16(image::ImageBuffer::from_raw(1, 1, vec![1u16, 40000, 65535]).unwrap());
         assert_eq!(decode_image(&png(&sixteen), "b").unwrap().pixels, Pixels::U16(vec![1, 40000, 65535]));
     }
 
@@ -129,7 +128,10 @@ mod tests {
     #[test]
     fn damaged_and_foreign_files_are_told_apart() {
         let whole = png(&image::RgbImage::from_fn(9, 9, |x, y| image::Rgb([x as u8, y as u8, 3])).into());
-        assert!(matches!(decode_image(&whole[..whole.len() / 2], "half.png"), Err(ImageError::Decode { .. })));
+        assert!(matches!(
+            decode_image(&whole[..whole.len() / 2], "half.png"),
+            Err(ImageError::Decode { .. })
+        ));
         let ktx = decode_image(b"\xabKTX 20\xbb\r\n\x1a\n....", "t.ktx2").unwrap_err();
         assert!(ktx.to_string().contains("KTX2"));
         assert!(matches!(decode_image(b"", "none"), Err(ImageError::Kind { .. })));

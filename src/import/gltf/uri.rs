@@ -86,9 +86,14 @@ mod tests {
 
     #[test]
     fn base64_as_in_the_standard() {
-        for (text, bytes) in
-            [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYg", "foob"), ("Zm9vYmE=", "fooba")]
-        {
+        for (text, bytes) in [
+            ("", ""),
+            ("Zg==", "f"),
+            ("Zm8=", "fo"),
+            ("Zm9v", "foo"),
+            ("Zm9vYg", "foob"),
+            ("Zm9vYmE=", "fooba"),
+        ] {
             assert_eq!(decode_base64(text.as_bytes()), Ok(bytes.as_bytes().to_vec()), "{text}");
         }
         for text in ["Z", "Zm9vY", "Zm 9", "Zg=", "Zm9v=", "Z===", "!!!!", "Zm=v"] {
