@@ -1,5 +1,6 @@
 //! glTF materials into Disney materials.
 
+use super::tint::{F0_OF_SPECULAR, disney_luminance, fit_tint};
 use super::{Note, Quality};
 use crate::color::Rgb;
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
@@ -11,8 +12,6 @@ use crate::scene::material::{
 };
 use crate::scene::source::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
 
-/// F0 of Disney's `specular` 1: F0 = 0.08·specular.
-const F0_OF_SPECULAR: f64 = 0.08;
 /// glTF's index of refraction where KHR_materials_ior says nothing.
 const DEFAULT_IOR: f32 = 1.5;
 
@@ -308,48 +307,6 @@ fn convert_anisotropy(
         }
     };
     notes.add("KHR_materials_anisotropy", quality, reason);
-}
-
-/// The luminance that Disney's tint divides by: 0.3 R + 0.6 G + 0.1 B (disney.brdf).
-fn disney_luminance(c: Rgb<f64>) -> f64 {
-    0.3 * c.r + 0.6 * c.g + 0.1 * c.b
-}
-
-/// A tint towards the base colour's hue that comes as near as it can to a colour.
-struct Tint {
-    /// specular_tint or sheen_tint, in [0, 1].
-    amount: f32,
-    /// The largest difference of a channel that stays, as a fraction of the luminance.
-    error: f64,
-    /// Whether the base colour has no hue to tint with.
-    grey_base: bool,
-}
-
-impl Tint {
-    fn describe(&self) -> String {
-        match (self.error < 5e-4, self.grey_base) {
-            (true, _) => "exact".into(),
-            (false, true) => {
-                format!("lost, since the base colour has none (off by {:.0}%)", 100.0 * self.error)
-            }
-            (false, false) => format!("tinted by the base colour, off by {:.0}%", 100.0 * self.error),
-        }
-    }
-}
-
-/// The t in [0, 1] for which lerp(1, base/lum(base), t) is nearest to color/lum(color), by least squares.
-fn fit_tint(color: Rgb<f64>, base: Rgb) -> Tint {
-    let chroma = |c: Rgb<f64>| {
-        let l = disney_luminance(c);
-        if l > 0.0 { c * (1.0 / l) - Rgb::WHITE } else { Rgb::BLACK }
-    };
-    let dot = |a: Rgb<f64>, b: Rgb<f64>| a.r * b.r + a.g * b.g + a.b * b.b;
-    let (wanted, hue) = (chroma(color), chroma(base.cast()));
-    let length = dot(hue, hue);
-    let grey_base = length < 1e-8;
-    let amount = if grey_base { 0.0 } else { (dot(wanted, hue) / length).clamp(0.0, 1.0) };
-    let error = (wanted - hue * amount).map(f64::abs).max_channel();
-    Tint { amount: amount as f32, error, grey_base }
 }
 
 #[cfg(test)]

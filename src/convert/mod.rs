@@ -1,6 +1,7 @@
 //! Source materials into Disney materials, with a note on every field: exact, carried, approximated or dropped.
 
 mod gltf;
+mod tint;
 
 use crate::disney::{DiffuseModel, Model};
 use crate::record::Warning;

@@ -192,8 +192,8 @@ fn mend_attributes(mesh: &mut Mesh, tell: &mut impl FnMut(usize, &str)) {
 
     let mut bad = 0;
     for c in &mut mesh.colors {
-        // NaN becomes 0, since max takes the other operand.
-        let mended = Vec4::from_array(c.to_array().map(|v| v.max(0.0).min(1.0)));
+        let mend = |v: f32| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) };
+        let mended = Vec4::from_array(c.to_array().map(mend));
         bad += usize::from(mended != *c);
         *c = mended;
     }

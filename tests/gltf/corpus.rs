@@ -18,6 +18,7 @@ const REFUSED: [(&str, &str); 7] = [
 ];
 
 #[test]
+#[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn every_file_of_the_corpus_is_imported_or_refused_with_its_reason() {
     let Some(corpus) = std::env::var_os("PIPELINE_CORPUS") else {
         eprintln!("skipped: PIPELINE_CORPUS names no folder");

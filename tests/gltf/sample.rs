@@ -1,5 +1,6 @@
 //! GLB files made in memory, and a sample that has a bit of everything.
 
+use std::f32::consts::FRAC_1_SQRT_2;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -114,11 +115,11 @@ pub(crate) fn sample() -> Vec<u8> {
         "scenes": [{"nodes": [0, 4, 5]}],
         "nodes": [
             {"name": "root", "translation": [0, 1, 0], "scale": [2, 2, 2], "children": [1, 2, 3]},
-            {"name": "left", "mesh": 0, "rotation": [0, 0.70710678, 0, 0.70710678]},
+            {"name": "left", "mesh": 0, "rotation": [0, FRAC_1_SQRT_2, 0, FRAC_1_SQRT_2]},
             {"name": "right", "mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1]},
             {"name": "eye", "camera": 0, "translation": [0, 0, 5]},
             {"mesh": 1},
-            {"name": "sun", "rotation": [-0.70710678, 0, 0, 0.70710678], "children": [6, 7],
+            {"name": "sun", "rotation": [(-FRAC_1_SQRT_2), 0, 0, FRAC_1_SQRT_2], "children": [6, 7],
              "extensions": {"KHR_lights_punctual": {"light": 0}}},
             {"extensions": {"KHR_lights_punctual": {"light": 1}}},
             {"camera": 1, "extensions": {"KHR_lights_punctual": {"light": 2}}}

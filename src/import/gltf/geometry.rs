@@ -86,7 +86,7 @@ impl<'a> Geometry<'a> {
             let (element, count) = (element.to_owned(), vertices as u64);
             return Err(GltfError::VertexIndex { element, index, count });
         }
-        if mode == Mode::Triangles && corners.len() % 3 != 0 {
+        if mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
             warn(format!("{} indices are not whole triangles; the last ones are ignored", corners.len()));
         }
         mesh.triangles = triangles(&corners, mode);
