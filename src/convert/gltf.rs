@@ -1,5 +1,6 @@
 //! glTF materials into Disney materials.
 
+use super::tint::{F0_OF_SPECULAR, disney_luminance, fit_tint};
 use super::{Note, Quality};
 use crate::color::Rgb;
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
@@ -9,12 +10,8 @@ use crate::scene::Material;
 use crate::scene::material::{
     Emission, NormalMap, Opacity, Param, ShadingFrame, Sides, TextureChannel, TextureMap,
 };
-use crate::scene::source::{
-    AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular,
-};
+use crate::scene::source::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
 
-/// F0 of Disney's `specular` 1: F0 = 0.08·specular.
-const F0_OF_SPECULAR: f32 = 0.08;
 /// glTF's index of refraction where KHR_materials_ior says nothing.
 const DEFAULT_IOR: f32 = 1.5;
 
@@ -94,8 +91,8 @@ pub(super) fn convert(
         let reason = "not read: a path tracer computes what it approximates";
         notes.add("occlusionTexture", Quality::Exact, reason);
     }
-    if let Some(f0) = material.scalar(Parameter::Specular).constant()
-        && f0 * F0_OF_SPECULAR > 0.5
+    if let Some(specular) = material.scalar(Parameter::Specular).constant()
+        && f64::from(specular) * F0_OF_SPECULAR > 0.5
         && source.metallic_factor < 1.0
     {
         let message = "a dielectric that reflects more than half of the light head-on; the Disney model adds its \
@@ -127,9 +124,10 @@ fn quality_of_core(diffuse: DiffuseModel) -> (Quality, &'static str) {
             "Burley's diffuse term for Lambert times 1 - F: albedo of a white dielectric +5% (roughness 0.5, 0°), +8% \
              (roughness 1, 0°), +24% (75°), +47% (85°)",
         ),
-        DiffuseModel::Lambert => {
-            (Quality::Carried, "Lambert without 1 - F: the diffuse term keeps the light that the highlight reflects")
-        }
+        DiffuseModel::Lambert => (
+            Quality::Carried,
+            "Lambert without 1 - F: the diffuse term keeps the light that the highlight reflects",
+        ),
     }
 }
 
@@ -176,8 +174,7 @@ fn emitting_sides(source: &GltfMaterial) -> Sides {
 
 fn convert_emission(source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
     let color = colored(source.emissive_factor, source.emissive_texture.as_ref());
-    material.emission =
-        Emission { color, strength: source.emissive_strength, sides: emitting_sides(source) };
+    material.emission = Emission { color, strength: source.emissive_strength, sides: emitting_sides(source) };
     if material.emits() {
         notes.add("emissiveFactor", Quality::Exact, "");
         if source.emissive_texture.is_some() {
@@ -208,7 +205,8 @@ fn make_unlit(source: &GltfMaterial, material: &mut Material, notes: &mut Notes)
 }
 
 /// F0 of a smooth interface to air: ((n-1)/(n+1))²; glTF's ior 0 stands for F = 1 everywhere.
-fn f0_of_ior(ior: f32) -> f32 {
+fn f0_of_ior(ior: f32) -> f64 {
+    let ior = f64::from(ior);
     if ior == 0.0 { 1.0 } else { Real::sqr((ior - 1.0) / (ior + 1.0)) }
 }
 
@@ -222,10 +220,11 @@ fn convert_specular(
 ) {
     let f0_ior = f0_of_ior(source.ior.unwrap_or(DEFAULT_IOR));
     let extension = source.specular.unwrap_or(GltfSpecular { factor: 1.0, color: Rgb::WHITE });
-    let f0 = extension.color.map(|c| (f0_ior * c).min(1.0) * extension.factor);
+    // In f64, so that the default F0 of 0.04 is specular 0.5 to the bit.
+    let f0 = extension.color.cast().map(|c: f64| (f0_ior * c).min(1.0) * f64::from(extension.factor));
     let tint = fit_tint(f0, source.base_color_factor);
     // Rounding may lift the luminance of white above 1.
-    let specular = (disney_luminance(f0) / F0_OF_SPECULAR).min(Parameter::Specular.max());
+    let specular = ((disney_luminance(f0) / F0_OF_SPECULAR) as f32).min(Parameter::Specular.max());
     *material.scalar_mut(Parameter::Specular) = Param::Constant(specular);
     *material.scalar_mut(Parameter::SpecularTint) = Param::Constant(tint.amount);
     match source.ior {
@@ -267,8 +266,9 @@ fn convert_clearcoat(coat: &GltfClearcoat, material: &mut Material, notes: &mut 
 
 /// KHR_materials_sheen: colour as sheen and sheen_tint.
 fn convert_sheen(sheen: &GltfSheen, source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
-    let tint = fit_tint(sheen.color, source.base_color_factor);
-    *material.scalar_mut(Parameter::Sheen) = Param::Constant(disney_luminance(sheen.color).min(1.0));
+    let color = sheen.color.cast();
+    let tint = fit_tint(color, source.base_color_factor);
+    *material.scalar_mut(Parameter::Sheen) = Param::Constant((disney_luminance(color) as f32).min(1.0));
     *material.scalar_mut(Parameter::SheenTint) = Param::Constant(tint.amount);
     let reason = format!(
         "no roughness; Charlie's lobe is 6 to 26 times brighter than Disney's at an equal factor; hue: {}",
@@ -293,55 +293,20 @@ fn convert_anisotropy(
     material.rotation = anisotropy.rotation;
     let (quality, reason) = if source.metallic_roughness_texture.is_some() {
         // The formula doesn't factor into a texture and a constant.
-        (Quality::Approximated, "the aspect is that of roughnessFactor; the texture's roughness is kept as it is")
+        (
+            Quality::Approximated,
+            "the aspect is that of roughnessFactor; the texture's roughness is kept as it is",
+        )
     } else {
         *material.scalar_mut(Parameter::Roughness) = Param::Constant((t * a).sqrt().sqrt());
         match anisotropic <= 1.0 {
             true => (Quality::Exact, ""),
-            false => (Quality::Approximated, "the ratio of the two alphas is more than Disney's 10 and ends there"),
+            false => {
+                (Quality::Approximated, "the ratio of the two alphas is more than Disney's 10 and ends there")
+            }
         }
     };
     notes.add("KHR_materials_anisotropy", quality, reason);
-}
-
-/// The luminance that Disney's tint divides by: 0.3 R + 0.6 G + 0.1 B (disney.brdf).
-fn disney_luminance(c: Rgb) -> f32 {
-    0.3 * c.r + 0.6 * c.g + 0.1 * c.b
-}
-
-/// A tint towards the base colour's hue that comes as near as it can to a colour.
-struct Tint {
-    /// specular_tint or sheen_tint, in [0, 1].
-    amount: f32,
-    /// The largest difference of a channel that stays, as a fraction of the luminance.
-    error: f32,
-    /// Whether the base colour has no hue to tint with.
-    grey_base: bool,
-}
-
-impl Tint {
-    fn describe(&self) -> String {
-        match (self.error < 5e-4, self.grey_base) {
-            (true, _) => "exact".into(),
-            (false, true) => format!("lost, since the base colour has none (off by {:.0}%)", 100.0 * self.error),
-            (false, false) => format!("tinted by the base colour, off by {:.0}%", 100.0 * self.error),
-        }
-    }
-}
-
-/// The t in [0, 1] for which lerp(1, base/lum(base), t) is nearest to color/lum(color), by least squares.
-fn fit_tint(color: Rgb, base: Rgb) -> Tint {
-    let chroma = |c: Rgb| {
-        let l = disney_luminance(c);
-        if l > 0.0 { c * (1.0 / l) - Rgb::WHITE } else { Rgb::BLACK }
-    };
-    let dot = |a: Rgb, b: Rgb| a.r * b.r + a.g * b.g + a.b * b.b;
-    let (wanted, hue) = (chroma(color), chroma(base));
-    let length = dot(hue, hue);
-    let grey_base = length < 1e-8;
-    let amount = if grey_base { 0.0 } else { (dot(wanted, hue) / length).clamp(0.0, 1.0) };
-    let error = (wanted - hue * amount).map(f32::abs).max_channel();
-    Tint { amount, error, grey_base }
 }
 
 #[cfg(test)]
@@ -378,7 +343,7 @@ mod tests {
         let read = |channel, factor| Param::Texture { map: TextureMap { channel, ..map.clone() }, factor };
         assert_eq!(*material.scalar(Parameter::Metallic), read(TextureChannel::B, 0.25));
         assert_eq!(*material.scalar(Parameter::Roughness), read(TextureChannel::G, 0.75));
-        assert!((scalar(&material, Parameter::Specular) - 0.5).abs() < 1e-6, "F0 is 0.04");
+        assert_eq!(scalar(&material, Parameter::Specular), 0.5, "F0 is 0.04");
         assert_eq!(scalar(&material, Parameter::SheenTint), 0.0);
         assert_eq!(quality(&notes, "baseColorFactor"), Quality::Carried);
         let mut notes = Vec::new();
@@ -435,7 +400,7 @@ mod tests {
         };
         let (material, notes) = run(&source(base));
         assert!((scalar(&material, Parameter::SpecularTint) - 1.0).abs() < 1e-6);
-        let f0 = 0.04 * 0.5 * disney_luminance(base);
+        let f0 = 0.04 * 0.5 * disney_luminance(base.cast()) as f32;
         assert!((scalar(&material, Parameter::Specular) - f0 / 0.08).abs() < 1e-6);
         let note = notes.iter().find(|n| n.field == "KHR_materials_specular").unwrap();
         assert!(note.reason.contains("hue: exact"), "{}", note.reason);
@@ -448,9 +413,8 @@ mod tests {
     #[test]
     fn a_coat_of_factor_1_is_four_times_disneys() {
         let coat = |roughness| GltfClearcoat { factor: 1.0, texture: None, roughness };
-        let with = |roughness| {
-            run(&GltfMaterial { clearcoat: Some(coat(roughness)), ..GltfMaterial::default() }).0
-        };
+        let with =
+            |roughness| run(&GltfMaterial { clearcoat: Some(coat(roughness)), ..GltfMaterial::default() }).0;
         assert_eq!(scalar(&with(0.0), Parameter::Clearcoat), 4.0);
         assert_eq!(scalar(&with(0.0), Parameter::ClearcoatGloss), 1.0);
         assert_eq!(scalar(&with(1.0), Parameter::ClearcoatGloss), 0.0);
@@ -462,8 +426,7 @@ mod tests {
     fn anisotropy_gives_gltfs_two_alphas() {
         for (roughness, strength) in [(0.8f32, 0.5f32), (0.5, 0.6), (1.0, 1.0), (0.7, 0.0)] {
             let anisotropy = Some(GltfAnisotropy { strength, rotation: 0.3 });
-            let source =
-                GltfMaterial { roughness_factor: roughness, anisotropy, ..GltfMaterial::default() };
+            let source = GltfMaterial { roughness_factor: roughness, anisotropy, ..GltfMaterial::default() };
             let (material, notes) = run(&source);
             // The parametrisation of disney.brdf.
             let aspect = (1.0 - 0.9 * scalar(&material, Parameter::Anisotropic)).sqrt();

@@ -3,6 +3,7 @@
 mod aris;
 mod gltf;
 mod mtl;
+mod tint;
 
 use crate::disney::{DiffuseModel, Model};
 use crate::record::Warning;

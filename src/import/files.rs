@@ -79,8 +79,13 @@ impl Files {
         let mut bytes = Vec::with_capacity(size as usize);
         // A file may grow while it is read.
         file.take(MAX_FILE).read_to_end(&mut bytes).map_err(failed)?;
-        self.read.push(FileDigest { name: name.to_owned(), digest: blake3::hash(&bytes) });
+        self.note(name, &bytes);
         Ok(bytes)
+    }
+
+    /// Counts `bytes`, the content of the file that the scene calls `name`, as read.
+    pub(super) fn note(&mut self, name: &str, bytes: &[u8]) {
+        self.read.push(FileDigest { name: name.to_owned(), digest: blake3::hash(bytes) });
     }
 
     /// Whether `name` is a file inside the folder.

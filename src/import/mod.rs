@@ -11,6 +11,7 @@ mod images;
 mod obj;
 mod validate;
 
+use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -121,21 +122,46 @@ pub enum ImportError {
 /// If the file or one that it names can't be read, isn't what it claims to be, needs an extension that is not read, has values
 /// out of range, or leaves nothing to render.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
+    let (name, dialect) = name_and_dialect(path)?;
+    let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
+    let bytes = files.read(name)?;
+    import_with(files, path, name, dialect, &bytes, options)
+}
+
+/// The scene in `bytes`, the content of a file that would be `path`: its ending chooses the importer, and the files that it names
+/// are read from the folder it would lie in.
+///
+/// # Errors
+/// As for [`import`].
+pub fn import_bytes(path: &Path, bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    let (name, dialect) = name_and_dialect(path)?;
+    let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
+    files.note(name, bytes);
+    import_with(files, path, name, dialect, bytes, options)
+}
+
+fn name_and_dialect(path: &Path) -> Result<(&str, Dialect), ImportError> {
     let name = path.file_name().unwrap_or_default();
     let name = name.to_str().ok_or_else(|| ImportError::Name { path: path.to_owned() })?;
-    let dialect =
-        Dialect::of(name).ok_or_else(|| ImportError::UnknownExtension { path: path.to_owned() })?;
-    let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
+    let dialect = Dialect::of(name);
+    dialect.map(|d| (name, d)).ok_or_else(|| ImportError::UnknownExtension { path: path.to_owned() })
+}
+
+/// Imports the content of the scene's own file, which `files` has counted, and sees to what all dialects owe.
+fn import_with(
+    mut files: Files,
+    path: &Path,
+    name: &str,
+    dialect: Dialect,
+    bytes: &[u8],
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
+    let packed = name.to_ascii_lowercase().ends_with(".gz");
+    let bytes = if packed { Cow::Owned(gunzip(bytes, path, MAX_UNPACKED)?) } else { Cow::Borrowed(bytes) };
     let (mut scene, mut warnings) = match dialect {
-        Dialect::Gltf => {
-            let bytes = read_scene(&mut files, path, name)?;
-            gltf::import(&mut files, name, &bytes, options)
-                .map_err(|cause| ImportError::Gltf { path: path.to_owned(), cause: Box::new(cause) })?
-        }
-        Dialect::Obj => {
-            let bytes = read_scene(&mut files, path, name)?;
-            obj::import(&mut files, name, &bytes)?
-        }
+        Dialect::Gltf => gltf::import(&mut files, name, &bytes, options)
+            .map_err(|cause| ImportError::Gltf { path: path.to_owned(), cause: Box::new(cause) })?,
+        Dialect::Obj => obj::import(&mut files, name, &bytes)?,
         Dialect::Aris => {
             // Its folder is the one that holds `config/`, above the scene's own.
             let (scene, warnings, of_config) = aris::import(path).map_err(Box::new)?;
@@ -168,12 +194,6 @@ impl Dialect {
             _ => None,
         }
     }
-}
-
-/// The content of the scene's own file, unpacked if it is a `.gz`.
-fn read_scene(files: &mut Files, path: &Path, name: &str) -> Result<Vec<u8>, ImportError> {
-    let bytes = files.read(name)?;
-    if name.to_ascii_lowercase().ends_with(".gz") { gunzip(&bytes, path, MAX_UNPACKED) } else { Ok(bytes) }
 }
 
 /// `packed` unpacked, at most `limit` bytes.

@@ -53,7 +53,9 @@ pub enum InvalidScene {
         count: usize,
     },
     /// An instance's transform holds NaN or puts vertices beyond the range of floats.
-    #[error("instance {instance:?} lies outside the range of floats: its transform is too large or not finite")]
+    #[error(
+        "instance {instance:?} lies outside the range of floats: its transform is too large or not finite"
+    )]
     Transform {
         /// The instance.
         instance: String,
@@ -127,11 +129,8 @@ fn keep<T>(values: &mut Vec<T>, used: &[bool]) {
 /// One value a vertex, and no index beyond the vertices.
 fn check_lengths(mesh: &Mesh) -> Result<(), InvalidScene> {
     let vertices = mesh.positions.len();
-    let optional = [
-        ("normals", mesh.normals.len()),
-        ("tangents", mesh.tangents.len()),
-        ("colors", mesh.colors.len()),
-    ];
+    let optional =
+        [("normals", mesh.normals.len()), ("tangents", mesh.tangents.len()), ("colors", mesh.colors.len())];
     let given = optional.into_iter().filter(|&(_, found)| found != 0);
     let sets = mesh.uvs.iter().map(|set| ("texture coordinates", set.len()));
     for (attribute, found) in given.chain(sets) {
@@ -173,9 +172,8 @@ fn mend_attributes(mesh: &mut Mesh, tell: &mut impl FnMut(usize, &str)) {
     tell(long, "normals were not of unit length and are scaled to it");
     tell(bad, "normals without a direction replaced by the mean of the faces around the vertex");
 
-    let bad_tangent = |t: &&Vec4| {
-        !t.is_finite() || t.w == 0.0 || t.truncate().as_dvec3().length_squared() == 0.0
-    };
+    let bad_tangent =
+        |t: &&Vec4| !t.is_finite() || t.w == 0.0 || t.truncate().as_dvec3().length_squared() == 0.0;
     let bad = mesh.tangents.iter().filter(bad_tangent).count();
     if bad > 0 {
         mesh.tangents.clear();
@@ -194,8 +192,8 @@ fn mend_attributes(mesh: &mut Mesh, tell: &mut impl FnMut(usize, &str)) {
 
     let mut bad = 0;
     for c in &mut mesh.colors {
-        // NaN becomes 0, since max takes the other operand.
-        let mended = Vec4::from_array(c.to_array().map(|v| v.max(0.0).min(1.0)));
+        let mend = |v: f32| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) };
+        let mended = Vec4::from_array(c.to_array().map(mend));
         bad += usize::from(mended != *c);
         *c = mended;
     }
@@ -238,12 +236,8 @@ fn mend_normals(mesh: &mut Mesh) -> (usize, usize) {
 fn check_instances(scene: &mut Scene<SourceMaterial>) -> Result<(), InvalidScene> {
     let boxes: Vec<Option<(Vec3, Vec3)>> = scene.meshes.iter().map(|mesh| bounds(mesh)).collect();
     for i in &scene.instances {
-        let reference = |kind, index, count| InvalidScene::Reference {
-            instance: i.name.clone(),
-            kind,
-            index,
-            count,
-        };
+        let reference =
+            |kind, index, count| InvalidScene::Reference { instance: i.name.clone(), kind, index, count };
         let Some(bounds) = boxes.get(i.mesh.0 as usize) else {
             return Err(reference("mesh", i.mesh.0, scene.meshes.len()));
         };
@@ -359,7 +353,11 @@ mod tests {
     fn degenerate_triangles_go_and_slivers_stay() {
         let mut mesh = square();
         mesh.triangles.extend([[0, 0, 1], [1, 1, 1]]);
-        mesh.positions.extend([Vec3::new(0.0, 0.0, 5.0), Vec3::new(1e-30, 0.0, 5.0), Vec3::new(0.0, 1e-30, 5.0)]);
+        mesh.positions.extend([
+            Vec3::new(0.0, 0.0, 5.0),
+            Vec3::new(1e-30, 0.0, 5.0),
+            Vec3::new(0.0, 1e-30, 5.0),
+        ]);
         mesh.normals.extend([Vec3::Z; 3]);
         mesh.uvs[0].extend([Vec2::ZERO; 3]);
         mesh.triangles.push([4, 5, 6]);

@@ -3,6 +3,7 @@
 //! Heavy data sits behind [`Arc`], so that the jobs of a sweep clone a scene for the price of its materials.
 
 pub mod camera;
+mod dump;
 pub mod environment;
 pub mod framing;
 pub mod light;

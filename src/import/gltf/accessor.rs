@@ -70,7 +70,8 @@ impl<'a> Accessors<'a> {
     pub(super) fn indices(&self, index: usize, element: &str) -> Result<Vec<u32>, GltfError> {
         let (accessor, component) = self.open(index, element, 1, "SCALAR")?;
         check_index_type(component, &format!("accessors[{index}]"))?;
-        let decode = |layout: &Layout, i: usize| unsigned(layout.component, &layout.bytes[i * layout.stride..]);
+        let decode =
+            |layout: &Layout, i: usize| unsigned(layout.component, &layout.bytes[i * layout.stride..]);
         self.read_elements(accessor, index, component, 1, 0, decode)
     }
 
@@ -130,7 +131,11 @@ impl<'a> Accessors<'a> {
             }
             let Checked::Valid(kind) = sparse.indices.component_type else {
                 let expected = "5121, 5123 or 5125";
-                return Err(GltfError::Invalid { element: name, property: "indices.componentType", expected });
+                return Err(GltfError::Invalid {
+                    element: name,
+                    property: "indices.componentType",
+                    expected,
+                });
             };
             check_index_type(kind.0, &name)?;
             let at = &sparse.indices;
@@ -305,7 +310,8 @@ mod tests {
     #[test]
     fn strides_and_offsets_are_followed() {
         let data: Vec<u8> = (0..16).collect();
-        let json = r#"{"bufferView": 1, "byteOffset": 4, "count": 2, "componentType": 5123, "type": "SCALAR"}"#;
+        let json =
+            r#"{"bufferView": 1, "byteOffset": 4, "count": 2, "componentType": 5123, "type": "SCALAR"}"#;
         assert_eq!(with(&data, json, |a| a.indices(0, "test")).unwrap(), [0x0504, 0x0d0c]);
         // The last element ends at the view's end, though its stride reaches beyond.
         let json = json.replace("\"byteOffset\": 4", "\"byteOffset\": 6");
@@ -330,7 +336,8 @@ mod tests {
 
     #[test]
     fn absurd_counts_fail_before_anything_is_allocated() {
-        for (count, offset) in [(1_000_000_000u64, 0u64), (u64::MAX, 0), (1, u64::MAX), (u64::MAX, u64::MAX)] {
+        for (count, offset) in [(1_000_000_000u64, 0u64), (u64::MAX, 0), (1, u64::MAX), (u64::MAX, u64::MAX)]
+        {
             for view in ["\"bufferView\": 0,", ""] {
                 let json = format!(
                     r#"{{{view} "byteOffset": {offset}, "count": {count}, "componentType": 5126, "type": "VEC3"}}"#

@@ -84,12 +84,7 @@ impl<'a> Buffers<'a> {
         let end = u128::from(offset) + u128::from(view.byte_length.0);
         if end > length as u128 {
             let container = format!("buffers[{}]", view.buffer.value());
-            return Err(GltfError::Bytes {
-                element: name,
-                container,
-                needed: end,
-                available: length as u64,
-            });
+            return Err(GltfError::Bytes { element: name, container, needed: end, available: length as u64 });
         }
         Ok((&bytes[offset as usize..end as usize], view))
     }

@@ -53,11 +53,12 @@ pub(super) fn open(bytes: &[u8]) -> Result<Document<'_>, GltfError> {
 
 /// A GLB's JSON and binary chunks. Later chunks are skipped, as the specification asks.
 fn split_glb(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), GltfError> {
-    let word = |at: usize| {
-        bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes).ok_or(
-            GltfError::Truncated { part: "header", needed: at as u64 + 4, found: bytes.len() as u64 },
-        )
-    };
+    let word =
+        |at: usize| {
+            bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes).ok_or(
+                GltfError::Truncated { part: "header", needed: at as u64 + 4, found: bytes.len() as u64 },
+            )
+        };
     let version = word(4)?;
     if version != 2 {
         return Err(GltfError::Container { part: "version", expected: 2, found: version });
@@ -111,8 +112,26 @@ fn prepare(json: &mut Value) {
 
 /// The properties that the crate truncates to 32 bits.
 const TRUNCATED: [&str; 21] = [
-    "attributes", "buffer", "bufferView", "camera", "children", "componentType", "index", "indices", "joints",
-    "light", "magFilter", "material", "mesh", "minFilter", "mode", "nodes", "sampler", "scene", "skin", "source",
+    "attributes",
+    "buffer",
+    "bufferView",
+    "camera",
+    "children",
+    "componentType",
+    "index",
+    "indices",
+    "joints",
+    "light",
+    "magFilter",
+    "material",
+    "mesh",
+    "minFilter",
+    "mode",
+    "nodes",
+    "sampler",
+    "scene",
+    "skin",
+    "source",
     "wrapS",
 ];
 
@@ -162,8 +181,7 @@ mod tests {
 
     #[test]
     fn an_index_beyond_32_bits_does_not_wrap_around() {
-        let root =
-            root(r#"{"asset": {"version": "2.0"}, "scene": 4294967296, "scenes": [{}]}"#).unwrap();
+        let root = root(r#"{"asset": {"version": "2.0"}, "scene": 4294967296, "scenes": [{}]}"#).unwrap();
         assert_eq!(root.scene.unwrap().value(), u32::MAX as usize);
         assert!(root.scenes[0].nodes.is_empty(), "a scene may have no nodes");
     }

@@ -86,7 +86,7 @@ impl<'a> Geometry<'a> {
             let (element, count) = (element.to_owned(), vertices as u64);
             return Err(GltfError::VertexIndex { element, index, count });
         }
-        if mode == Mode::Triangles && corners.len() % 3 != 0 {
+        if mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
             warn(format!("{} indices are not whole triangles; the last ones are ignored", corners.len()));
         }
         mesh.triangles = triangles(&corners, mode);
@@ -120,8 +120,7 @@ impl<'a> Geometry<'a> {
         }
         // Without normals the specification asks for flat ones and to ignore the tangents.
         if let Some(index) = attribute(primitive, Semantic::Tangents).filter(|_| !mesh.normals.is_empty()) {
-            mesh.tangents =
-                self.accessors.floats::<4>(index, element)?.into_iter().map(Vec4::from).collect();
+            mesh.tangents = self.accessors.floats::<4>(index, element)?.into_iter().map(Vec4::from).collect();
             check("TANGENT", mesh.tangents.len())?;
         }
         while let Some(index) = attribute(primitive, Semantic::TexCoords(mesh.uvs.len() as u32)) {

@@ -10,9 +10,7 @@ use super::error::GltfError;
 use super::texture::{Slot, Textures};
 use crate::color::Rgb;
 use crate::scene::material::TextureMap;
-use crate::scene::source::{
-    AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular,
-};
+use crate::scene::source::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
 use crate::scene::texture::Encoding;
 
 /// The legal values of a number.
@@ -39,7 +37,11 @@ pub(super) fn read(
     let mut material = GltfMaterial {
         base_color_factor: reader.color("baseColorFactor", [r, g, b], Limits::Unit)?,
         alpha_factor: reader.number("baseColorFactor's alpha", a, Limits::Unit)?,
-        base_color_texture: reader.info(pbr.base_color_texture.as_ref(), Encoding::Srgb, "baseColorTexture")?,
+        base_color_texture: reader.info(
+            pbr.base_color_texture.as_ref(),
+            Encoding::Srgb,
+            "baseColorTexture",
+        )?,
         metallic_factor: reader.number("metallicFactor", pbr.metallic_factor.0, Limits::Unit)?,
         roughness_factor: reader.number("roughnessFactor", pbr.roughness_factor.0, Limits::Unit)?,
         metallic_roughness_texture: reader.info(
@@ -159,7 +161,10 @@ impl Reader<'_, '_> {
                     )?,
                 });
                 self.skip(json.specular_texture.as_ref(), "KHR_materials_specular.specularTexture");
-                self.skip(json.specular_color_texture.as_ref(), "KHR_materials_specular.specularColorTexture");
+                self.skip(
+                    json.specular_color_texture.as_ref(),
+                    "KHR_materials_specular.specularColorTexture",
+                );
             }
             "KHR_materials_clearcoat" => {
                 let json: Clearcoat = parse(json)?;
@@ -186,7 +191,11 @@ impl Reader<'_, '_> {
                 let json: Sheen = parse(json)?;
                 material.sheen = Some(GltfSheen {
                     color: self.color("sheenColorFactor", json.sheen_color_factor, Limits::Unit)?,
-                    roughness: self.number("sheenRoughnessFactor", json.sheen_roughness_factor, Limits::Unit)?,
+                    roughness: self.number(
+                        "sheenRoughnessFactor",
+                        json.sheen_roughness_factor,
+                        Limits::Unit,
+                    )?,
                 });
                 self.skip(json.sheen_color_texture.as_ref(), "KHR_materials_sheen.sheenColorTexture");
                 self.skip(json.sheen_roughness_texture.as_ref(), "KHR_materials_sheen.sheenRoughnessTexture");

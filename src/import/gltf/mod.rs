@@ -17,9 +17,6 @@ mod nodes;
 mod texture;
 mod uri;
 
-#[cfg(test)]
-mod tests;
-
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -160,8 +157,7 @@ impl Stage<'_> {
             let message = "skins are not applied: the mesh is shown as it was bound, where the node stands";
             self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
         }
-        let world_from_object =
-            Affine3A::from_cols_array(&m.to_cols_array().map(|v| v as f32));
+        let world_from_object = Affine3A::from_cols_array(&m.to_cols_array().map(|v| v as f32));
         let parts = self.read_mesh(index, element)?;
         if self.scene.instances.len() as u64 + parts.len() as u64 > MAX_INSTANCES {
             return Err(GltfError::TooMany { what: "instances", limit: MAX_INSTANCES });
@@ -173,11 +169,7 @@ impl Stage<'_> {
     }
 
     /// The meshes and materials of `meshes[index]`, read when it is first asked for.
-    fn read_mesh(
-        &mut self,
-        index: usize,
-        element: &str,
-    ) -> Result<Vec<(MeshId, MaterialId)>, GltfError> {
+    fn read_mesh(&mut self, index: usize, element: &str) -> Result<Vec<(MeshId, MaterialId)>, GltfError> {
         let json = lookup(&self.root.meshes, index, element, "meshes")?;
         if let Some(parts) = &self.meshes[index] {
             return Ok(parts.clone());
@@ -186,7 +178,8 @@ impl Stage<'_> {
         let mut parts = Vec::new();
         for (i, primitive) in json.primitives.iter().enumerate() {
             let element = format!("meshes[{index}].primitives[{i}]");
-            let name = if json.primitives.len() == 1 { mesh_name.clone() } else { format!("{mesh_name}/{i}") };
+            let name =
+                if json.primitives.len() == 1 { mesh_name.clone() } else { format!("{mesh_name}/{i}") };
             let colored = geometry::attribute(primitive, Semantic::Colors(0)).is_some();
             let material = self.material_of(primitive.material.map(|m| m.value()), colored, &element)?;
             let alpha = match self.materials[material.0 as usize].item.alpha_mode {
@@ -237,10 +230,8 @@ fn missing_coordinates(scene: &Scene<SourceMaterial>, file: &str, warnings: &mut
         }
         let lacking = source.textures().find(|(_, map)| map.uv_set as usize >= mesh.uvs.len());
         if let Some((field, map)) = lacking {
-            let message = format!(
-                "its {field} uses TEXCOORD_{}, which mesh {:?} doesn't have",
-                map.uv_set, mesh.name
-            );
+            let message =
+                format!("its {field} uses TEXCOORD_{}, which mesh {:?} doesn't have", map.uv_set, mesh.name);
             warnings.push(Warning::new(format!("{file}: material {:?}", material.name), message));
         }
     }

@@ -44,11 +44,8 @@ pub(super) fn place<'a>(
 ) -> Result<Vec<Placed<'a>>, GltfError> {
     let mut visited = vec![false; root.nodes.len()];
     // A stack of our own: the depth of the hierarchy is the file's choice.
-    let mut waiting: Vec<(usize, DAffine3, String)> = roots(root)?
-        .into_iter()
-        .rev()
-        .map(|(index, element)| (index, DAffine3::IDENTITY, element))
-        .collect();
+    let mut waiting: Vec<(usize, DAffine3, String)> =
+        roots(root)?.into_iter().rev().map(|(index, element)| (index, DAffine3::IDENTITY, element)).collect();
     let mut placed = Vec::new();
     while let Some((index, world_from_parent, referrer)) = waiting.pop() {
         let node = lookup(&root.nodes, index, &referrer, "nodes")?;
@@ -183,11 +180,7 @@ fn rigid(placed: &Placed) -> Result<Affine3A, GltfError> {
     let (right, up, back) =
         frame.ok_or_else(|| transform_error(placed.index, "axes y and z that span a plane, for a camera"))?;
     Ok(Affine3A {
-        matrix3: Mat3A::from_cols(
-            right.as_vec3().into(),
-            up.as_vec3().into(),
-            back.as_vec3().into(),
-        ),
+        matrix3: Mat3A::from_cols(right.as_vec3().into(), up.as_vec3().into(), back.as_vec3().into()),
         translation: placed.world_from_node.translation.as_vec3().into(),
     })
 }
@@ -204,7 +197,8 @@ pub(super) fn light(
         true => Ok(value),
         false => Err(GltfError::Range { element: element.clone(), property, value, expected }),
     };
-    let not_negative = |property, v: f32| check(property, v, v.is_finite() && v >= 0.0, "finite and not negative");
+    let not_negative =
+        |property, v: f32| check(property, v, v.is_finite() && v >= 0.0, "finite and not negative");
     for channel in json.color {
         not_negative("color", channel)?;
     }
@@ -227,7 +221,12 @@ pub(super) fn light(
             let spot =
                 spot.ok_or_else(|| GltfError::Missing { element: element.clone(), property: "spot" })?;
             let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
-            check("outerConeAngle", outer, outer > 0.0 && outer <= std::f32::consts::FRAC_PI_2, "in (0, π/2]")?;
+            check(
+                "outerConeAngle",
+                outer,
+                outer > 0.0 && outer <= std::f32::consts::FRAC_PI_2,
+                "in (0, π/2]",
+            )?;
             check("innerConeAngle", inner, (0.0..outer).contains(&inner), "in [0, outerConeAngle)")?;
             LightKind::Spot { position, direction: direction()?, inner, outer, range }
         }

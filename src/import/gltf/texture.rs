@@ -117,7 +117,9 @@ impl<'a> Textures<'a> {
         let source = json.source.value();
         if source == u32::MAX as usize {
             let others = json.extensions.as_ref().map(|e| &e.others);
-            for extension in ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds", "EXT_texture_avif"] {
+            for extension in
+                ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds", "EXT_texture_avif"]
+            {
                 if others.is_some_and(|o| o.contains_key(extension)) {
                     return Err(GltfError::Extension { element: name, extension });
                 }
@@ -174,11 +176,8 @@ impl<'a> Textures<'a> {
 
 /// Wrapping and filter of a sampler. There are no mip levels, so the magnification filter alone counts.
 fn read_sampler(sampler: &Sampler, index: usize) -> Result<([Wrap; 2], TexelFilter), GltfError> {
-    let invalid = |property, expected| GltfError::Invalid {
-        element: format!("samplers[{index}]"),
-        property,
-        expected,
-    };
+    let invalid =
+        |property, expected| GltfError::Invalid { element: format!("samplers[{index}]"), property, expected };
     let wrap = |mode: Checked<WrappingMode>, property| match mode {
         Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
         Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::Mirror),
