@@ -11,10 +11,7 @@ mod yaml;
 
 use std::path::Path;
 
-use super::{FileDigest, FileError, Files, ImageError, ObjError};
-use crate::record::Warning;
-use crate::scene::Scene;
-use crate::scene::source::SourceMaterial;
+use super::{FileError, Files, ImageError, Imported, ObjError};
 
 /// Why an Aris scene cannot be read. Places are `file:line:column`.
 #[derive(Debug, thiserror::Error)]
@@ -148,7 +145,7 @@ pub enum ArisError {
         /// The key that names it.
         key: String,
         /// The reason.
-        cause: ObjError,
+        cause: Box<ObjError>,
     },
     /// An image cannot be read.
     #[error("{place}: {key}: {cause}")]
@@ -158,7 +155,7 @@ pub enum ArisError {
         /// The key that names it.
         key: String,
         /// The reason.
-        cause: ImageError,
+        cause: Box<ImageError>,
     },
 }
 
@@ -166,9 +163,7 @@ pub enum ArisError {
 ///
 /// # Errors
 /// If a file is missing or cannot be read, a key is unknown or missing, or a value is of the wrong kind or out of range.
-pub(super) fn import(
-    path: &Path,
-) -> Result<(Scene<SourceMaterial>, Vec<Warning>, Vec<FileDigest>), ArisError> {
+pub(super) fn import(path: &Path) -> Result<Imported, ArisError> {
     let failed = |cause| ArisError::Scene { path: path.display().to_string(), cause };
     let absolute =
         path.canonicalize().map_err(|cause| failed(FileError::Read { path: path.into(), cause }))?;
@@ -185,7 +180,7 @@ pub(super) fn import(
     let composed = compose::compose(&mut files, &name)?;
     let mut warnings = Vec::new();
     let scene = scene::build(&mut files, &composed, &mut warnings)?;
-    Ok((scene, warnings, files.into_digests()))
+    Ok(Imported { scene, warnings, files: files.into_digests() })
 }
 
 #[cfg(test)]

@@ -144,7 +144,7 @@ fn read_geometry(
             let mesh = obj::read_mesh(path, &bytes, warnings).map_err(|cause| ArisError::Mesh {
                 place,
                 key: key.clone(),
-                cause,
+                cause: Box::new(cause),
             })?;
             loaded.insert(path.to_owned(), (Arc::new(mesh), None));
         }
@@ -461,7 +461,7 @@ fn read_environment(
             let mut image = decode_image(&bytes, name).map_err(|cause| ArisError::Image {
                 place: place.clone(),
                 key: key.to_owned(),
-                cause,
+                cause: Box::new(cause),
             })?;
             let Pixels::F32(values) = &mut image.pixels else {
                 return Err(path.mismatch(key, "an image of floats, EXR or HDR"));
