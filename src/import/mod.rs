@@ -158,20 +158,21 @@ fn import_with(
 ) -> Result<Imported, ImportError> {
     let packed = name.to_ascii_lowercase().ends_with(".gz");
     let bytes = if packed { Cow::Owned(gunzip(bytes, path, MAX_UNPACKED)?) } else { Cow::Borrowed(bytes) };
+    let mut digests = None;
     let (mut scene, mut warnings) = match dialect {
         Dialect::Gltf => gltf::import(&mut files, name, &bytes, options)
             .map_err(|cause| ImportError::Gltf { path: path.to_owned(), cause: Box::new(cause) })?,
         Dialect::Obj => obj::import(&mut files, name, &bytes)?,
         Dialect::Aris => {
-            // Its folder is the one that holds `config/`, above the scene's own.
-            let (scene, warnings, of_config) = aris::import(path).map_err(Box::new)?;
-            files = of_config;
-            (scene, warnings)
+            // Its folder is the one that holds `config/`, above the scene's own, and so are its files.
+            let of_config = aris::import(path).map_err(Box::new)?;
+            digests = Some(of_config.files);
+            (of_config.scene, of_config.warnings)
         }
     };
     validate::validate(&mut scene, name, &mut warnings)
         .map_err(|cause| ImportError::Invalid { path: path.to_owned(), cause })?;
-    Ok(Imported { scene, warnings, files: files.into_digests() })
+    Ok(Imported { scene, warnings, files: digests.unwrap_or_else(|| files.into_digests()) })
 }
 
 /// The kinds of files that are read.

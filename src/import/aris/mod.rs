@@ -11,11 +11,8 @@ mod yaml;
 
 use std::path::Path;
 
-use super::{FileDigest, FileError, Files, ObjError};
+use super::{FileError, Files, Imported, ObjError};
 use crate::imagefile::ImageFileError;
-use crate::record::Warning;
-use crate::scene::Scene;
-use crate::scene::source::SourceMaterial;
 
 /// Why an Aris scene cannot be read. Places are `file:line:column`.
 #[derive(Debug, thiserror::Error)]
@@ -149,7 +146,7 @@ pub enum ArisError {
         /// The key that names it.
         key: String,
         /// The reason.
-        cause: ObjError,
+        cause: Box<ObjError>,
     },
     /// An image cannot be read.
     #[error("{place}: {key}: {cause}")]
@@ -159,7 +156,7 @@ pub enum ArisError {
         /// The key that names it.
         key: String,
         /// The reason.
-        cause: ImageFileError,
+        cause: Box<ImageFileError>,
     },
 }
 
@@ -167,9 +164,7 @@ pub enum ArisError {
 ///
 /// # Errors
 /// If a file is missing or cannot be read, a key is unknown or missing, or a value is of the wrong kind or out of range.
-pub(super) fn import(
-    path: &Path,
-) -> Result<(Scene<SourceMaterial>, Vec<Warning>, Files), ArisError> {
+pub(super) fn import(path: &Path) -> Result<Imported, ArisError> {
     let failed = |cause| ArisError::Scene { path: path.display().to_string(), cause };
     let absolute =
         path.canonicalize().map_err(|cause| failed(FileError::Read { path: path.into(), cause }))?;
@@ -186,7 +181,7 @@ pub(super) fn import(
     let composed = compose::compose(&mut files, &name)?;
     let mut warnings = Vec::new();
     let scene = scene::build(&mut files, &composed, &mut warnings)?;
-    Ok((scene, warnings, files))
+    Ok(Imported { scene, warnings, files: files.into_digests() })
 }
 
 #[cfg(test)]

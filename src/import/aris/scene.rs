@@ -1,6 +1,6 @@
 //! A composed configuration into a scene: geometry, BRDFs, emitters, camera, environment.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
@@ -144,7 +144,7 @@ fn read_geometry(
             let mesh = obj::read_mesh(path, &bytes, warnings).map_err(|cause| ArisError::Mesh {
                 place,
                 key: key.clone(),
-                cause,
+                cause: Box::new(cause),
             })?;
             loaded.insert(path.to_owned(), (Arc::new(mesh), None));
         }
@@ -220,14 +220,20 @@ fn material_names(paths: &[String]) -> Vec<String> {
         let file = path.rsplit('/').next().unwrap_or(path);
         file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned()
     };
-    let stems: Vec<String> = paths.iter().map(stem).collect();
-    let mut names: Vec<String> = Vec::new();
-    for (i, stem) in stems.iter().enumerate() {
-        let alone = stems.iter().filter(|other| *other == stem).count() == 1;
-        let mut name = if alone { stem.clone() } else { format!("{stem}_{i}") };
-        while names.contains(&name) || (!alone && stems.contains(&name)) {
+    let mut uses: BTreeMap<String, usize> = BTreeMap::new();
+    for path in paths {
+        *uses.entry(stem(path)).or_default() += 1;
+    }
+    let mut taken = BTreeSet::new();
+    let mut names = Vec::new();
+    for (i, path) in paths.iter().enumerate() {
+        let stem = stem(path);
+        let alone = uses[&stem] == 1;
+        let mut name = if alone { stem } else { format!("{stem}_{i}") };
+        while (!alone && uses.contains_key(&name)) || taken.contains(&name) {
             name.push('_');
         }
+        taken.insert(name.clone());
         names.push(name);
     }
     names
@@ -461,7 +467,7 @@ fn read_environment(
             let (image, replaced) = decode_image(&bytes, name).map_err(|cause| ArisError::Image {
                 place: place.clone(),
                 key: key.to_owned(),
-                cause,
+                cause: Box::new(cause),
             })?;
             if !matches!(image.pixels, Pixels::F32(_)) {
                 return Err(path.mismatch(key, "an image of floats, EXR or HDR"));
@@ -477,4 +483,17 @@ fn read_environment(
         other => return Err(unknown_name(node, "the environment", other, &["none", "constant", "envmap"])),
     }
     config.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn material_names_are_stems_and_unique() {
+        let paths = ["m/sphere.obj", "n/sphere.obj", "m/sphere_0.obj", "floor.obj", "sphere.obj", ".obj", ""];
+        let names = material_names(&paths.map(str::to_owned));
+        assert_eq!(names, ["sphere_0_", "sphere_1", "sphere_0", "floor", "sphere_4", "_5", "_6"]);
+        assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
+    }
 }

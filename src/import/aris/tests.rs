@@ -4,11 +4,10 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::color::Rgb;
+use crate::scene::Scene;
 use crate::scene::camera::{Aperture, FovAxis, Projection};
 use crate::scene::environment::{EnvironmentMap, Equirectangular};
-use crate::scene::source::{ArisBrdf, ArisMaterial};
-
-type Result3 = Result<(Scene<SourceMaterial>, Vec<Warning>, Vec<FileDigest>), ArisError>;
+use crate::scene::source::{ArisBrdf, ArisMaterial, SourceMaterial};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n";
 
@@ -27,7 +26,7 @@ fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
 }
 
 /// The scene `config/scene/s.yaml` with other files.
-fn import_scene(text: &str, others: &[(&str, &[u8])]) -> Result3 {
+fn import_scene(text: &str, others: &[(&str, &[u8])]) -> Result<Imported, ArisError> {
     let mut files = vec![("config/scene/s.yaml", text.as_bytes())];
     files.extend_from_slice(others);
     let folder = folder(&files);
@@ -47,7 +46,8 @@ fn aris<'a>(scene: &'a Scene<SourceMaterial>, name: &str) -> &'a ArisMaterial {
 
 #[test]
 fn a_scene_keeps_its_camera_to_the_letter() {
-    let (scene, warnings, files) = import_scene(&format!("{GEOMETRY}{BRDF}{CAMERA}"), &[]).unwrap();
+    let Imported { scene, warnings, files } =
+        import_scene(&format!("{GEOMETRY}{BRDF}{CAMERA}"), &[]).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     let camera = &scene.cameras[0].item;
     assert_eq!(camera.size, Some((80, 60)));
@@ -81,7 +81,7 @@ fn defaults_are_merged_in_order_with_the_file_where_it_says_self() {
         ("config/scene/environment/ones.yaml", b"name: constant\nconfig:\n  color: [1, 2, 3]\n"),
     ];
     let text = "defaults:\n  - base\n  - environment: ones\n  - brdf: red\n  - _self_\nwidth: 400\ncamera:\n  config:\n    fov: 60\n";
-    let (scene, ..) = import_scene(text, &others).unwrap();
+    let Imported { scene, .. } = import_scene(text, &others).unwrap();
     assert_eq!(aris(&scene, "a").brdf, ArisBrdf::Diffuse { color: Rgb::new(1.0, 0.0, 0.0) });
     assert_eq!(scene.environment.as_ref().unwrap().color, Rgb::new(1.0, 2.0, 3.0));
     assert_eq!(scene.cameras[0].item.size, Some((400, 60)));
@@ -93,7 +93,7 @@ fn defaults_are_merged_in_order_with_the_file_where_it_says_self() {
     let first = text
         .replace("  - base\n", "  - _self_\n  - base\n")
         .replace("brdf: red\n  - _self_\n", "brdf: red\n");
-    assert_eq!(fov(&import_scene(&first, &others).unwrap().0), 90.0, "base comes after _self_ and wins");
+    assert_eq!(fov(&import_scene(&first, &others).unwrap().scene), 90.0, "base comes after _self_ and wins");
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn every_brdf_is_read() {
          - {{name: disney, config: {{color: [1, 0.4, 0.7], roughness: 0.2, metallic: 1, subsurface: 0, specular: 0.7, \
          specularTint: 0.1, anisotropic: 0.8, sheen: 0.6, sheenTint: 0.9, clearcoat: 1, clearcoatGloss: 0.5}}}}\n"
     );
-    let (scene, warnings, files) = import_scene(&text, &[]).unwrap();
+    let Imported { scene, warnings, files } = import_scene(&text, &[]).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     assert_eq!(scene.meshes.len(), 1, "the same mesh five times");
     assert_eq!(files.len(), 2, "and read once");
@@ -131,7 +131,7 @@ fn every_brdf_is_read() {
     assert_eq!(aris(&scene, "a_2").brdf, ArisBrdf::Dielectric { ext_ior: 1.0, int_ior: 1.5 });
     let ArisBrdf::Disney(disney) = &aris(&scene, "a_4").brdf else { panic!() };
     assert_eq!(disney.scalars, [0.0, 1.0, 0.7, 0.1, 0.2, 0.8, 0.6, 0.9, 1.0, 0.5].map(Some));
-    let (_, warnings, _) = import_scene(&text.replace("sheen: 0.6,", ""), &[]).unwrap();
+    let Imported { warnings, .. } = import_scene(&text.replace("sheen: 0.6,", ""), &[]).unwrap();
     assert!(
         warnings.len() == 1 && warnings[0].message.contains("brdf[4].sheen is not given"),
         "{warnings:?}"
@@ -144,7 +144,7 @@ fn transforms_move_positions_and_leave_normals() {
         "geometry:\n  name: mesh\n  config:\n    paths: [data/a.obj, data/a.obj]\n    transforms:\n      - - {{type: scale, params: [2, 3, -4]}}\n\
          \x20       - {{type: translate, params: [0, 0, 5]}}\n      - []\n{CAMERA}brdf: [{{name: mirror}}, {{name: mirror}}]\n"
     );
-    let (scene, ..) = import_scene(&text, &[]).unwrap();
+    let Imported { scene, .. } = import_scene(&text, &[]).unwrap();
     let moved = scene.mesh_of(&scene.instances[0]);
     assert_eq!(moved.positions, [[0.0, 0.0, 5.0], [2.0, 0.0, 5.0], [0.0, 3.0, 5.0]].map(glam::Vec3::from));
     assert_eq!(moved.normals, [glam::Vec3::Z; 3]);
@@ -157,7 +157,7 @@ fn transforms_move_positions_and_leave_normals() {
 fn area_lights_shine_from_their_mesh() {
     let light = "emitters:\n  - name: area\n    config:\n      radiance: [40, 40, 40]\n      i_primitive: 0\n      geometry:\n      i_emitter:\n";
     let text = format!("{GEOMETRY}{BRDF}{CAMERA}{light}");
-    assert_eq!(aris(&import_scene(&text, &[]).unwrap().0, "a").radiance, Some(Rgb::grey(40.0)));
+    assert_eq!(aris(&import_scene(&text, &[]).unwrap().scene, "a").radiance, Some(Rgb::grey(40.0)));
     for (from, to, expected) in [
         ("i_primitive: 0", "i_primitive: 1", "mesh 1, but there are 1 meshes"),
         ("i_primitive: 0", "i_primitive: 0.5", "a whole number"),
@@ -221,7 +221,7 @@ fn a_thin_lens_is_square() {
     let text = format!("{GEOMETRY}{BRDF}{CAMERA}")
         .replace("perspective", "thin")
         .replace("fov: 90", "fov: 90\n    aperture: 0.3\n    focal_distance: 5");
-    let lens = import_scene(&text, &[]).unwrap().0.cameras[0].item.lens.unwrap();
+    let lens = import_scene(&text, &[]).unwrap().scene.cameras[0].item.lens.unwrap();
     assert_eq!((lens.radius, lens.focal_distance, lens.shape), (0.3, 5.0, Aperture::Square));
 }
 
@@ -236,7 +236,8 @@ fn environment_maps_are_floats_without_negative_values() {
         .unwrap();
     let text =
         format!("{GEOMETRY}{BRDF}{CAMERA}environment:\n  name: envmap\n  config:\n    path: data/e.exr\n");
-    let (scene, warnings, _) = import_scene(&text, &[("data/e.exr", &bytes.into_inner())]).unwrap();
+    let Imported { scene, warnings, .. } =
+        import_scene(&text, &[("data/e.exr", &bytes.into_inner())]).unwrap();
     let environment = scene.environment.unwrap();
     let EnvironmentMap::Image { image, mapping } = environment.map else { panic!() };
     assert_eq!(mapping, Equirectangular::Aris);
@@ -276,7 +277,7 @@ fn damaged_scenes_never_panic() {
         }
         std::fs::write(&path, &damaged).unwrap();
         match import(&path) {
-            Ok((scene, ..)) => {
+            Ok(Imported { scene, .. }) => {
                 read += 1;
                 assert!(scene.cameras[0].item.world_from_camera.is_finite());
             }
@@ -295,11 +296,11 @@ fn the_corpus_is_read_as_far_as_its_meshes_are_there() {
     };
     let scenes = PathBuf::from(corpus).join("aris/config/scene");
     for (name, meshes) in [("cbox", 6), ("cbox_diffuse", 6), ("bunny", 1)] {
-        let (scene, warnings, _) = import(&scenes.join(format!("{name}.yaml"))).unwrap();
+        let Imported { scene, warnings, .. } = import(&scenes.join(format!("{name}.yaml"))).unwrap();
         assert_eq!((scene.instances.len(), scene.materials.len()), (meshes, meshes), "{name}");
         assert!(warnings.is_empty(), "{name}: {warnings:?}");
     }
-    let (cbox, ..) = import(&scenes.join("cbox.yaml")).unwrap();
+    let Imported { scene: cbox, .. } = import(&scenes.join("cbox.yaml")).unwrap();
     assert_eq!(aris(&cbox, "sphere1").brdf, ArisBrdf::Mirror);
     assert_eq!(aris(&cbox, "light").radiance, Some(Rgb::grey(40.0)));
     for name in ["ajax", "ajax_simple", "veach", "lego"] {

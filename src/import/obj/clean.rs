@@ -22,6 +22,8 @@ pub(super) struct Cleaned {
     pub libraries: Vec<(String, u32)>,
     /// Whether vertices have colours.
     pub colored: bool,
+    /// The line of the first smoothing group.
+    pub smoothing: Option<u32>,
 }
 
 /// Faces that share object and material.
@@ -309,7 +311,10 @@ impl Faces<'_> {
             | "hole" | "scrv" | "sp" | "end" | "con" | "bzp" | "bsp" | "cdc" | "cdp" | "res" => {
                 flaws.add(Flaw::FreeForm, line)
             }
-            // Smoothing and merging groups, display attributes.
+            "s" if !matches!(rest, "off" | "0" | "") => {
+                self.out.smoothing.get_or_insert(line);
+            }
+            // Merging groups, display attributes.
             "s" | "mg" | "bevel" | "c_interp" | "d_interp" | "lod" | "usemap" | "maplib" | "shadow_obj"
             | "trace_obj" | "ctech" | "stech" => {}
             _ => flaws.add(Flaw::Unknown, line),

@@ -1,5 +1,7 @@
 //! A lenient parser of MTL libraries: a line that cannot be read is told with its number and left out, the others count.
 
+use std::collections::BTreeMap;
+
 use glam::Vec2;
 
 use crate::color::Rgb;
@@ -15,7 +17,14 @@ const MAX_WARNINGS: usize = 100;
 pub(super) fn parse(file: &str, bytes: &[u8], warnings: &mut Vec<Warning>) -> Vec<(String, MtlMaterial)> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let mut parser = Parser { file, line: 0, warnings: Vec::new(), left_out: 0, materials: Vec::new() };
+    let mut parser = Parser {
+        file,
+        line: 0,
+        warnings: Vec::new(),
+        left_out: 0,
+        materials: Vec::new(),
+        latest: BTreeMap::new(),
+    };
     for (number, line) in (1_u32..).zip(text.split('\n')) {
         parser.line = number;
         parser.read(line.trim());
@@ -24,7 +33,9 @@ pub(super) fn parse(file: &str, bytes: &[u8], warnings: &mut Vec<Warning>) -> Ve
     if parser.left_out > 0 {
         warnings.push(Warning::new(file, format!("{} more warnings left out", parser.left_out)));
     }
-    parser.materials
+    let Parser { materials, latest, .. } = parser;
+    let counts = |(at, (name, _)): &(usize, (String, MtlMaterial))| latest.get(name) == Some(at);
+    materials.into_iter().enumerate().filter(counts).map(|(_, material)| material).collect()
 }
 
 struct Parser<'a> {
@@ -33,6 +44,8 @@ struct Parser<'a> {
     warnings: Vec<Warning>,
     left_out: u64,
     materials: Vec<(String, MtlMaterial)>,
+    /// The index of each name's last definition.
+    latest: BTreeMap<String, usize>,
 }
 
 impl Parser<'_> {
@@ -89,13 +102,12 @@ impl Parser<'_> {
         }
         let material =
             MtlMaterial { library: self.file.to_owned(), line: self.line, ..MtlMaterial::default() };
-        if let Some(at) = self.materials.iter().position(|(n, _)| *n == name) {
+        if let Some(at) = self.latest.insert(name.clone(), self.materials.len()) {
             let first = self.materials[at].1.line;
             self.warn(format!(
                 "material {} is defined in line {first} already; this one counts",
                 shown(&name)
             ));
-            self.materials.remove(at);
         }
         self.materials.push((name, material));
     }

@@ -72,6 +72,14 @@ fn missing_normals_are_the_faces_own_where_others_are_given() {
 }
 
 #[test]
+fn smoothing_without_normals_is_told() {
+    let (scene, warnings) = ok(&format!("{QUAD}s off\ns 1\nf 1 2 3\n"));
+    assert!(scene.meshes[0].normals.is_empty());
+    assert!(warnings.len() == 1 && warnings[0].place == "a.obj:6", "{warnings:?}");
+    assert!(ok(&format!("{QUAD}vn 0 0 1\ns 1\nf 1//1 2//1 3//1\n")).1.is_empty());
+}
+
+#[test]
 fn concave_polygons_are_not_fanned() {
     let (scene, _) = ok("v 0 0 0\nv 2 1 0\nv 0 2 0\nv 0.5 1 0\nf 2 3 4 1\nf 1 2 3 4\n");
     for triangle in corners(&scene.meshes[0]) {
