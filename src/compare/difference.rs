@@ -7,7 +7,7 @@ use super::view::{Region, View, index};
 
 /// The absolute difference of two images' first layers times `scale`, over the region that holds both data windows.
 ///
-/// Channels pair as in [`idiff`](super::idiff()): by their place in OpenImageIO's order, with the first image's names (the
+/// Channels pair as in [`idiff`](mod@super::idiff): by their place in OpenImageIO's order, with the first image's names (the
 /// second's beyond them); what an image lacks is 0. A difference with a value that is not finite is not finite, so it shows.
 ///
 /// # Errors

@@ -246,6 +246,11 @@ fn max(a: f32, b: f32) -> f32 {
     if a < b { b } else { a }
 }
 
+/// Whether a difference is within a limit; NaN is within none.
+fn within(difference: f64, limit: f64) -> bool {
+    difference <= limit
+}
+
 /// Goes over the region's values, rows first, channels last, as `ImageBufAlgo::compare`.
 fn measure(a: &View<'_>, b: &View<'_>, thresholds: &Thresholds) -> Result<PartStatistics, CompareError> {
     let channels = a.channels.len().max(b.channels.len());
@@ -264,8 +269,7 @@ fn measure(a: &View<'_>, b: &View<'_>, thresholds: &Thresholds) -> Result<PartSt
         failed: 0,
     };
     let exceeds = |f: f64, relative: f64, limit: f32, relative_limit: f32| {
-        // Written so that NaN exceeds every limit, as there.
-        !(f <= f64::from(limit)) && !(relative <= f64::from(relative_limit))
+        !within(f, limit.into()) && !within(relative, relative_limit.into())
     };
     for (count, (x, y)) in region.iter().enumerate() {
         if count > 0 && count % BATCH == 0 {
@@ -291,7 +295,7 @@ fn measure(a: &View<'_>, b: &View<'_>, thresholds: &Thresholds) -> Result<PartSt
             let relative = if mean > 0.0 { f / f64::from(mean) } else { 0.0 };
             batch += f;
             batch_squares += f * f;
-            if !(f <= part.max_error) {
+            if !within(f, part.max_error) {
                 (part.max_error, part.at, part.channel) = (f, (x, y), channel);
             }
             warned |= exceeds(f, relative, thresholds.warn, thresholds.warnrelative);

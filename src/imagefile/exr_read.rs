@@ -172,6 +172,9 @@ fn copy_line(bytes: &[u8], sample_type: FileType, values: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
+    use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples};
+    use exr::prelude::{Compression, LayerAttributes, LineOrder, Vec2, WritableImage, f16};
+
     use crate::imagefile::{ImageFileError, decode, encode_exr};
     use crate::math::hash;
     use crate::raster::{Attribute, Layer, Raster, SampleType, Window};
@@ -211,6 +214,63 @@ mod tests {
             if let Ok(raster) = decode(&damaged, "flipped") {
                 for layer in &raster.layers {
                     assert!(layer.channels.iter().all(|c| c.values.len() == layer.window.pixels()));
+                }
+            }
+        }
+    }
+
+    /// A small image with the crate's own writer: what ours does not write.
+    fn written_by_others(compression: Compression, blocks: Blocks) -> Vec<u8> {
+        let size = Vec2(37, 23);
+        let halves = |k: f32| {
+            let values = (0..size.area()).map(|i| f16::from_f32((i % 97) as f32 * k)).collect();
+            AnyChannel::new("H", FlatSamples::F16(values))
+        };
+        let floats =
+            AnyChannel::new("F", FlatSamples::F32((0..size.area()).map(|i| i as f32 / 7.0).collect()));
+        let encoding = Encoding { compression, blocks, line_order: LineOrder::Increasing };
+        let channels = AnyChannels::sort([halves(0.25), floats].into_iter().collect());
+        let mut bytes = Vec::new();
+        exr::image::Image::from_layer(exr::image::Layer::new(
+            size,
+            LayerAttributes::named("x"),
+            encoding,
+            channels,
+        ))
+        .write()
+        .non_parallel()
+        .to_buffered(std::io::Cursor::new(&mut bytes))
+        .unwrap();
+        bytes
+    }
+
+    #[test]
+    fn every_lossless_compression_is_read_and_damage_to_any_compression_is_an_error_not_a_panic() {
+        let tiles = Blocks::Tiles(Vec2(16, 16));
+        for (compression, lossless) in [
+            (Compression::Uncompressed, true),
+            (Compression::RLE, true),
+            (Compression::ZIP1, true),
+            (Compression::ZIP16, true),
+            (Compression::PIZ, true),
+            (Compression::PXR24, false),
+            (Compression::B44, false),
+            (Compression::DWAA(None), false),
+        ] {
+            for blocks in [Blocks::ScanLines, tiles] {
+                let bytes = written_by_others(compression, blocks);
+                let raster = decode(&bytes, "whole").unwrap();
+                let values = &raster.picture().channel("F").unwrap().values;
+                let tolerance = if lossless { 0.0 } else { 0.2 };
+                let near = |(i, v): (usize, &f32)| (v - i as f32 / 7.0).abs() <= tolerance;
+                assert!(values.iter().enumerate().all(near), "{compression}");
+                for seed in 0..150_u64 {
+                    let mut damaged = bytes.clone();
+                    let bits = hash::mix64(seed);
+                    let at = (bits >> 8) as usize % damaged.len();
+                    damaged[at] ^= (bits & 0xff).max(1) as u8;
+                    let _may_fail = decode(&damaged, "flipped");
+                    let _must_not_panic = decode(&bytes[..at], "cut");
                 }
             }
         }
