@@ -60,12 +60,19 @@ struct Checker<'a> {
 
 impl Checker<'_> {
     /// One path with one value, alone.
-    fn check(&mut self, scratch: &mut Scene<Material>, path: &Located<String>, value: &Located<Value>) -> Finding {
+    fn check(
+        &mut self,
+        scratch: &mut Scene<Material>,
+        path: &Located<String>,
+        value: &Located<Value>,
+    ) -> Finding {
         match (Target::parse(&path.value), &value.value) {
             // The caller chose the scene by it.
             (Ok(Target::Scene), _) => return Finding::Fine,
             // A fixed spot angle alone may exceed the other, a lens or pose field alone contradict the camera: judged together.
-            (Ok(Target::Camera(field)), _) if field != super::edit::CameraField::Name => return Finding::Fine,
+            (Ok(Target::Camera(field)), _) if field != super::edit::CameraField::Name => {
+                return Finding::Fine;
+            }
             (Ok(Target::Light(_, super::edit::LightField::Inner | super::edit::LightField::Outer)), _) => {
                 return self.check_name_alone(scratch, path, value);
             }
@@ -111,7 +118,9 @@ impl Checker<'_> {
         for overrides in combinations {
             let mut scratch = scene.clone();
             let mut settings = self.manifest.render.clone();
-            let Err(error) = apply_all(&mut scratch, &mut settings, &overrides, &mut no_image) else { continue };
+            let Err(error) = apply_all(&mut scratch, &mut settings, &overrides, &mut no_image) else {
+                continue;
+            };
             let span = match &error {
                 EditError::UnknownName { kind: "camera", .. } => self.manifest.render_camera.clone(),
                 EditError::Conflict { second, .. } => self.span_of(&format!("camera.{second}")),
@@ -151,7 +160,12 @@ impl Checker<'_> {
         self.paths().find(|p| p.value.starts_with(prefix)).map(|p| p.span.clone())
     }
 
-    fn note(&mut self, error: EditError, path: &std::ops::Range<usize>, value: &std::ops::Range<usize>) -> Finding {
+    fn note(
+        &mut self,
+        error: EditError,
+        path: &std::ops::Range<usize>,
+        value: &std::ops::Range<usize>,
+    ) -> Finding {
         let half = error.half();
         let error = ManifestError::InScene { scene: self.scene_path.to_owned(), error };
         let (span, finding) = match half {
