@@ -10,8 +10,9 @@ use crate::scene::texture::Pixels;
 use crate::scene::{Image, Material, Scene};
 use crate::settings::RenderSettings;
 
-/// Whether every path of the manifest is in the scene that was loaded from `scene_path`, and every value suits it. Image
-/// files must exist; they are not read.
+/// Whether every path of the manifest is in the scene that was loaded from `scene_path`, and every value suits it. Fields
+/// that only make sense together, those of the camera and a spot's angles, are tried with the first and with the last value of
+/// each axis. Image files must exist; they are not read.
 ///
 /// # Errors
 /// Everything that does not suit, each at its place.
