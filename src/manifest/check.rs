@@ -10,8 +10,9 @@ use crate::scene::texture::Pixels;
 use crate::scene::{Image, Material, Scene};
 use crate::settings::RenderSettings;
 
-/// Whether every path of the manifest is in the scene that was loaded from `scene_path`, and every value suits it. Image
-/// files must exist; they are not read.
+/// Whether every path of the manifest is in the scene that was loaded from `scene_path`, and every value suits it. Fields
+/// that only make sense together, those of the camera and a spot's angles, are tried with the first and with the last value of
+/// each axis. Image files must exist; they are not read.
 ///
 /// # Errors
 /// Everything that does not suit, each at its place.
@@ -60,12 +61,19 @@ struct Checker<'a> {
 
 impl Checker<'_> {
     /// One path with one value, alone.
-    fn check(&mut self, scratch: &mut Scene<Material>, path: &Located<String>, value: &Located<Value>) -> Finding {
+    fn check(
+        &mut self,
+        scratch: &mut Scene<Material>,
+        path: &Located<String>,
+        value: &Located<Value>,
+    ) -> Finding {
         match (Target::parse(&path.value), &value.value) {
             // The caller chose the scene by it.
             (Ok(Target::Scene), _) => return Finding::Fine,
             // A fixed spot angle alone may exceed the other, a lens or pose field alone contradict the camera: judged together.
-            (Ok(Target::Camera(field)), _) if field != super::edit::CameraField::Name => return Finding::Fine,
+            (Ok(Target::Camera(field)), _) if field != super::edit::CameraField::Name => {
+                return Finding::Fine;
+            }
             (Ok(Target::Light(_, super::edit::LightField::Inner | super::edit::LightField::Outer)), _) => {
                 return self.check_name_alone(scratch, path, value);
             }
@@ -111,7 +119,9 @@ impl Checker<'_> {
         for overrides in combinations {
             let mut scratch = scene.clone();
             let mut settings = self.manifest.render.clone();
-            let Err(error) = apply_all(&mut scratch, &mut settings, &overrides, &mut no_image) else { continue };
+            let Err(error) = apply_all(&mut scratch, &mut settings, &overrides, &mut no_image) else {
+                continue;
+            };
             let span = match &error {
                 EditError::UnknownName { kind: "camera", .. } => self.manifest.render_camera.clone(),
                 EditError::Conflict { second, .. } => self.span_of(&format!("camera.{second}")),
@@ -151,7 +161,12 @@ impl Checker<'_> {
         self.paths().find(|p| p.value.starts_with(prefix)).map(|p| p.span.clone())
     }
 
-    fn note(&mut self, error: EditError, path: &std::ops::Range<usize>, value: &std::ops::Range<usize>) -> Finding {
+    fn note(
+        &mut self,
+        error: EditError,
+        path: &std::ops::Range<usize>,
+        value: &std::ops::Range<usize>,
+    ) -> Finding {
         let half = error.half();
         let error = ManifestError::InScene { scene: self.scene_path.to_owned(), error };
         let (span, finding) = match half {

@@ -44,6 +44,8 @@ pub enum ManifestError {
         table: &'static str,
         /// What was probably meant.
         nearest: Option<&'static str>,
+        /// The table that has such a key.
+        belongs: Option<&'static str>,
         /// The keys there are.
         known: &'static [&'static str],
     },
@@ -134,6 +136,16 @@ pub enum ManifestError {
         /// The limit.
         limit: u64,
     },
+    /// Jobs with so many overrides that they would not fit in memory.
+    #[error("{jobs} jobs with {overrides} overrides each are more than {limit} overrides")]
+    TooManyOverrides {
+        /// Jobs.
+        jobs: u64,
+        /// Overrides of each.
+        overrides: u64,
+        /// The limit on their product.
+        limit: u64,
+    },
     /// Two jobs would have one name, and so one output file.
     #[error("two jobs would both be called `{name}`: {first} and {second}")]
     SameName {
@@ -167,8 +179,9 @@ impl ManifestError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Edit(error) | Self::InScene { error, .. } => error.hint(),
+            Self::UnknownKey { belongs: Some(home), .. } => Some(format!("it belongs in {home}")),
             Self::UnknownKey { nearest: Some(nearest), .. } => Some(format!("did you mean `{nearest}`?")),
-            Self::UnknownKey { nearest: None, known, table, .. } => {
+            Self::UnknownKey { known, table, .. } => {
                 let all: Vec<String> = known.iter().map(|k| format!("`{k}`")).collect();
                 Some(format!("{table} has {}", all.join(", ")))
             }

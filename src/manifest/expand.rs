@@ -9,6 +9,9 @@ use super::model::{Axis, Manifest, Setting};
 use super::names::{axis_keys, job_name, plain_name, stem};
 use crate::record::{Coordinate, Job, Override, Value};
 
+/// The largest number of overrides of all jobs together: a few gigabytes.
+const MAX_OVERRIDES: u64 = 10_000_000;
+
 /// One job a combination of scene and axes' values, the last axis fastest, without those that `exclude` drops.
 ///
 /// `scenes` are the files that the caller found for [`Manifest::scene_patterns`], in order; they are used as they are. An axis
@@ -29,6 +32,11 @@ pub fn expand(manifest: &Manifest, scenes: &[PathBuf]) -> Result<Vec<Job>, Manif
         let span = manifest.axes.last().map_or(0..0, |a| a.span.clone());
         let error = ManifestError::TooManyJobs { jobs, limit: manifest.max_jobs };
         return Err(fail(vec![Diagnostic::new(error, span)]));
+    }
+    let overrides = (manifest.fixed().count() + manifest.axes.iter().flat_map(Axis::paths).count()) as u64;
+    if jobs.saturating_mul(overrides) > MAX_OVERRIDES {
+        let error = ManifestError::TooManyOverrides { jobs, overrides, limit: MAX_OVERRIDES };
+        return Err(fail(vec![Diagnostic::new(error, 0..0)]));
     }
 
     let keys = axis_keys(&manifest.axes);
@@ -183,12 +191,15 @@ fn holds(manifest: &Manifest, wanted: &Setting, chosen: &[usize], scene: Option<
     if manifest.scene_is_axis && wanted.path.value == "scene" {
         return label.is_some() && scene == label;
     }
-    manifest.axes.iter().zip(chosen).filter(|(axis, _)| is_called(axis, &wanted.path.value)).any(|(axis, &index)| {
-        let point = &axis.points[index];
-        let mut of_path = axis.paths().iter().zip(&point.values).filter(|(p, _)| p.value == wanted.path.value);
-        let whole = axis.id() == wanted.path.value && point.values == [wanted.value.value.clone()];
-        whole || label == Some(&point.label) || of_path.any(|(_, value)| *value == wanted.value.value)
-    })
+    manifest.axes.iter().zip(chosen).filter(|(axis, _)| is_called(axis, &wanted.path.value)).any(
+        |(axis, &index)| {
+            let point = &axis.points[index];
+            let mut of_path =
+                axis.paths().iter().zip(&point.values).filter(|(p, _)| p.value == wanted.path.value);
+            let whole = axis.id() == wanted.path.value && point.values == [wanted.value.value.clone()];
+            whole || label == Some(&point.label) || of_path.any(|(_, value)| *value == wanted.value.value)
+        },
+    )
 }
 
 /// An error for every name that two jobs would share on a file system that ignores case.
@@ -198,7 +209,8 @@ fn same_names(manifest: &Manifest, jobs: &[Job]) -> Vec<Diagnostic> {
     let mut errors = Vec::new();
     for job in jobs {
         if let Some(first) = seen.insert(job.name.to_lowercase(), job) {
-            let differs = job.coordinates.iter().zip(&first.coordinates).position(|(a, b)| a.index != b.index);
+            let differs =
+                job.coordinates.iter().zip(&first.coordinates).position(|(a, b)| a.index != b.index);
             let scene_axis = usize::from(job.coordinates.len() > manifest.axes.len());
             let axis = differs.and_then(|i| i.checked_sub(scene_axis)).and_then(|i| manifest.axes.get(i));
             let span = match (axis, differs) {

@@ -21,7 +21,7 @@ pub use check::check;
 pub use error::{Color, Diagnostic, ManifestError, ManifestErrors, Source};
 pub use expand::expand;
 pub use model::{
-    Axis, CompareSpec, DEFAULT_MAX_JOBS, Distribution, Interval, Located, MAX_MAX_JOBS, Manifest, Point, Random,
-    Reach, ScenePattern, Sequence, Setting, SheetSpec, Steps,
+    Axis, CompareSpec, DEFAULT_MAX_JOBS, Distribution, Interval, Located, MAX_MAX_JOBS, Manifest, Point,
+    Random, Reach, ScenePattern, Sequence, Setting, SheetSpec, Steps,
 };
 pub use schema::json_schema;

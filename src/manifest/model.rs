@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 use super::error::Source;
+use super::names::plain_name;
 use super::schema::{CameraTable, EnvironmentTable, LightTable, MaterialTable, OneOrMany, SettingTree};
 use crate::record::Value;
 use crate::settings::{Display, RenderSettings};
@@ -315,6 +316,11 @@ impl Manifest {
     /// The manifest's folder: what its paths are relative to.
     pub fn folder(&self) -> &Path {
         self.source.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// The sweep's name as a folder's: without separators or anything else that file systems dislike.
+    pub fn folder_name(&self) -> String {
+        plain_name(&self.name)
     }
 
     /// The entries of `scene`, for the caller to look up.

@@ -117,7 +117,10 @@ mod tests {
     #[test]
     fn a_number_s_text_depends_on_it_alone() {
         let roughness = |n| labelled("material.ball.roughness", Value::Number(n));
-        assert_eq!([0.0, 0.3, 1.0, 0.125, 1.0 / 3.0].map(roughness), ["0.00", "0.30", "1.00", "0.125", "0.3333333333333333"]);
+        assert_eq!(
+            [0.0, 0.3, 1.0, 0.125, 1.0 / 3.0].map(roughness),
+            ["0.00", "0.30", "1.00", "0.125", "0.3333333333333333"]
+        );
         assert_eq!(labelled("render.spp", Value::Number(64.0)), "64");
         assert_eq!(labelled("environment.rotation", Value::Number(-0.0)), "0");
         assert_eq!(labelled("environment.intensity", Value::Number(1e300)), "1e300");

@@ -128,7 +128,8 @@ mod tests {
 
     /// All properties of an object's schema, those of its flattened enumerations included.
     fn properties(schema: &Json) -> BTreeSet<String> {
-        let mut all: BTreeSet<String> = schema["properties"].as_object().into_iter().flat_map(|p| p.keys().cloned()).collect();
+        let mut all: BTreeSet<String> =
+            schema["properties"].as_object().into_iter().flat_map(|p| p.keys().cloned()).collect();
         for combined in ["oneOf", "allOf", "anyOf"] {
             for part in schema[combined].as_array().into_iter().flatten() {
                 all.extend(properties(part));
@@ -157,7 +158,11 @@ mod tests {
         ] {
             assert_eq!(properties(&definition(name)), known(keys), "{name}");
             let text = definition(name).to_string();
-            assert!(text.contains("\"additionalProperties\":false") || text.contains("\"unevaluatedProperties\":false"), "{name}: {text}");
+            assert!(
+                text.contains("\"additionalProperties\":false")
+                    || text.contains("\"unevaluatedProperties\":false"),
+                "{name}: {text}"
+            );
         }
         let render: Vec<&str> = RenderField::ALL.iter().map(|f| f.name()).collect();
         assert_eq!(properties(&definition("RenderSettings")), known(&render));

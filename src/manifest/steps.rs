@@ -16,7 +16,12 @@ pub(super) struct Senseless(pub &'static str);
 /// `steps` values with equal differences; the ends are exact.
 pub(super) fn range(interval: Interval) -> Result<Vec<f64>, Senseless> {
     let Interval { from, to, .. } = interval;
-    spaced(interval, |t| round_to(from * (1.0 - t) + to * t, RANGE_DIGITS))
+    // A value next to nothing beside the ends is what rounding left of 0.
+    let nothing = 1e-14 * from.abs().max(to.abs());
+    spaced(interval, |t| {
+        let value = from * (1.0 - t) + to * t;
+        if value.abs() <= nothing { 0.0 } else { round_to(value, RANGE_DIGITS) }
+    })
 }
 
 /// `steps` values with equal ratios; the ends are exact.
@@ -33,9 +38,13 @@ fn spaced(interval: Interval, value: impl Fn(f64) -> f64) -> Result<Vec<f64>, Se
     let Interval { from, to, steps } = interval;
     match steps {
         0 => return Err(Senseless("`steps` must be at least 1")),
-        1 if from != to => return Err(Senseless("one step cannot reach from `from` to `to`: they must be the same")),
+        1 if from != to => {
+            return Err(Senseless("one step cannot reach from `from` to `to`: they must be the same"));
+        }
         1 => return Ok(vec![from]),
-        _ if from == to => return Err(Senseless("several steps from a number to itself would be the same job")),
+        _ if from == to => {
+            return Err(Senseless("several steps from a number to itself would be the same job"));
+        }
         _ => {}
     }
     let last = steps - 1;

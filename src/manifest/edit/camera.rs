@@ -244,7 +244,10 @@ fn matrix(value: &Value) -> Result<Affine3A, Mismatch> {
     let volume = a.dot(b.cross(c)).abs();
     let box_volume = a.length() * b.length() * c.length();
     if volume.is_finite() && volume > 1e-6 * box_volume {
-        Ok(Affine3A { matrix3: Mat3A::from_cols(a.into(), b.into(), c.into()), translation: column(3).into() })
+        Ok(Affine3A {
+            matrix3: Mat3A::from_cols(a.into(), b.into(), c.into()),
+            translation: column(3).into(),
+        })
     } else {
         Err(Mismatch)
     }

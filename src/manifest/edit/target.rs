@@ -56,7 +56,8 @@ impl Target {
             "camera" => {
                 let field = only_field(path, rest, "camera.FIELD")?;
                 let known = || CameraField::ALL.iter().map(|f| f.name());
-                let field = CameraField::from_name(field).ok_or_else(|| unknown("the camera", field, known()))?;
+                let field =
+                    CameraField::from_name(field).ok_or_else(|| unknown("the camera", field, known()))?;
                 Ok(Self::Camera(field))
             }
             "environment" => {
@@ -69,7 +70,8 @@ impl Target {
             "render" => {
                 let field = only_field(path, rest, "render.FIELD")?;
                 let known = || RenderField::ALL.iter().map(|f| f.name());
-                let field = RenderField::from_name(field).ok_or_else(|| unknown("the render", field, known()))?;
+                let field =
+                    RenderField::from_name(field).ok_or_else(|| unknown("the render", field, known()))?;
                 Ok(Self::Render(field))
             }
             "scene" if path == "scene" => Ok(Self::Scene),
@@ -185,7 +187,9 @@ mod tests {
         let error = Target::parse("material.ball.rougness").unwrap_err();
         assert_eq!(error.to_string(), "a material has no field `rougness`");
         assert!(error.hint().unwrap().starts_with("did you mean `roughness`?"));
-        for incomplete in ["material", "material.ball", "material..roughness", "camera", "light.a.", "scene.x", "render."] {
+        for incomplete in
+            ["material", "material.ball", "material..roughness", "camera", "light.a.", "scene.x", "render."]
+        {
             assert!(matches!(Target::parse(incomplete), Err(EditError::Incomplete { .. })), "{incomplete}");
         }
         assert!(matches!(Target::parse("camera.position.x"), Err(EditError::UnknownField { .. })));

@@ -302,3 +302,54 @@ fn an_environment_is_made_where_there_is_none() {
         edited(&[("environment.image", text("sky.hdr")), ("environment.kind", text("none"))]).unwrap();
     assert!(scene.environment.is_none());
 }
+
+/// Sets the environment's image to these pixels, 2 × 1.
+fn with_sky(scene: &mut Scene<Material>, channels: u8, pixels: Pixels) -> Result<(), EditError> {
+    let mut load = move |_: &Path| -> Result<Image, BoxedError> {
+        Ok(Image { name: "sky".into(), width: 2, height: 1, channels, pixels: pixels.clone() })
+    };
+    apply(scene, &mut RenderSettings::default(), "environment.image", &text("sky"), &mut load)
+}
+
+#[test]
+fn eight_bit_skies_are_decoded_and_unsound_ones_refused() {
+    let mut lit = scene();
+    with_sky(&mut lit, 1, Pixels::U8(vec![255, 188])).unwrap();
+    let Pixels::F32(values) = &lit.images[0].pixels else { panic!("{:?}", lit.images[0]) };
+    assert_eq!((lit.images[0].channels, values.len(), values[0]), (3, 6, 1.0));
+    assert!((values[3] - 0.502_9).abs() < 1e-3, "{values:?}");
+    let refused = with_sky(&mut scene(), 3, Pixels::F32(vec![f32::NAN; 6]));
+    assert!(matches!(refused, Err(EditError::ImageNotFinite { .. })));
+    let refused = with_sky(&mut scene(), 3, Pixels::F32(vec![1.0; 5]));
+    assert!(matches!(refused, Err(EditError::ImageSize { found: 5, expected: 6, .. })));
+}
+
+#[test]
+fn another_image_keeps_the_mapping_of_the_first() {
+    let mut aris = scene();
+    with_sky(&mut aris, 1, Pixels::F32(vec![1.0; 2])).unwrap();
+    let image = crate::scene::ImageId(0);
+    aris.environment.as_mut().unwrap().map = EnvironmentMap::Image { image, mapping: Equirectangular::Aris };
+    with_sky(&mut aris, 1, Pixels::F32(vec![2.0; 2])).unwrap();
+    let map = &aris.environment.as_ref().unwrap().map;
+    let second = crate::scene::ImageId(1);
+    assert_eq!(*map, EnvironmentMap::Image { image: second, mapping: Equirectangular::Aris });
+}
+
+#[test]
+fn a_z_up_scene_is_orbited_about_z() {
+    let mut scene = scene();
+    scene.cameras[0].item = Camera::look_at(Vec3::new(0.0, -4.0, 1.0), Vec3::Z, Vec3::Z, 0.7);
+    let mut none = |_: &Path| -> Result<Image, BoxedError> { Err("unused".into()) };
+    let mut settings = RenderSettings::default();
+    for (azimuth, expected) in [(0.0, Vec3::new(0.0, -4.0, 1.0)), (90.0, Vec3::new(4.0, 0.0, 1.0))] {
+        let overrides = [
+            Override { path: "camera.orbit".into(), value: list(&[azimuth, 0.0]) },
+            Override { path: "camera.target".into(), value: list(&[0.0, 0.0, 1.0]) },
+        ];
+        apply_all(&mut scene, &mut settings, &overrides, &mut none).unwrap();
+        let at = position(&scene.cameras[0].item);
+        assert!(at.distance(expected) < 1e-5, "{at}");
+        assert!(looks_at(&scene.cameras[0].item, Vec3::Z));
+    }
+}

@@ -120,7 +120,8 @@ pub(super) fn color(value: &Value, max: f32) -> Result<Rgb, Mismatch> {
 
 /// `#rrggbb`, sRGB-encoded, as a linear colour.
 fn hex_color(text: &str) -> Option<Rgb> {
-    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
+    let digits =
+        text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
     let channel = |i: usize| {
         let code = u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok()?;
         Some(linear_from_srgb(f32::from(code) / 255.0))

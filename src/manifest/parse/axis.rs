@@ -16,8 +16,19 @@ const AXIS: &str = "[[axis]]";
 /// Any number.
 const ANY: std::ops::RangeInclusive<f64> = f64::MIN..=f64::MAX;
 
+/// How many jobs the axes so far come to, so that no axis computes more values than there may be jobs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Budget {
+    /// The product of the axes' lengths.
+    pub(super) jobs: u64,
+    /// The limit.
+    pub(super) max_jobs: u64,
+    /// It has been told that the limit is passed: later axes compute nothing.
+    pub(super) is_spent: bool,
+}
+
 /// One axis, if all of it is sound.
-pub(super) fn axis(reader: &mut Reader, node: &Node<'_>, max_jobs: u64) -> Option<Axis> {
+pub(super) fn axis(reader: &mut Reader, node: &Node<'_>, budget: &mut Budget) -> Option<Axis> {
     let before = reader.errors.len();
     let table = reader.table("axis", node, AXIS, keys::AXIS)?;
     let reach = reach(reader, &table);
@@ -28,9 +39,10 @@ pub(super) fn axis(reader: &mut Reader, node: &Node<'_>, max_jobs: u64) -> Optio
     let points = match &steps {
         Steps::Values(values) => listed_points(reader, &reach, values),
         computed => {
-            let values = numbers(reader, computed, &span, max_jobs)?;
+            let values = numbers(reader, computed, &span, budget)?;
             let Reach::Path(path) = &reach else {
-                let error = ManifestError::Steps { why: "a `zip` needs `values`: a list with one value a path each" };
+                let error =
+                    ManifestError::Steps { why: "a `zip` needs `values`: a list with one value a path each" };
                 reader.note(error, span);
                 return None;
             };
@@ -39,6 +51,7 @@ pub(super) fn axis(reader: &mut Reader, node: &Node<'_>, max_jobs: u64) -> Optio
     };
     let points = points.and_then(|p| labelled(reader, p, labels.as_deref(), &reach))?;
     let axis = Axis { reach, steps, name, labels, points, span: table.span };
+    budget.jobs = budget.jobs.saturating_mul(axis.points.len() as u64);
     (reader.errors.len() == before).then_some(axis)
 }
 
@@ -50,7 +63,7 @@ fn reach(reader: &mut Reader, table: &Table<'_, '_>) -> Option<Reach> {
             return None;
         }
         (None, None) => {
-            reader.missing(table, "`path`, or `zip` with several paths");
+            reader.missing(table, &["path", "zip"], "`path`, or `zip` with several paths");
             return None;
         }
         (Some(path), None) => Reach::Path(reader.text("path", path)?),
@@ -85,7 +98,7 @@ fn steps(reader: &mut Reader, table: &Table<'_, '_>) -> Option<(Steps, std::ops:
             return None;
         }
         [] => {
-            reader.missing(table, "one of `values`, `range`, `log_range`, `random`, `sobol`");
+            reader.missing(table, keys::STEPS, "one of `values`, `range`, `log_range`, `random`, `sobol`");
             return None;
         }
     };
@@ -127,7 +140,11 @@ fn random(reader: &mut Reader, t: &Table<'_, '_>) -> Option<Random> {
             Some("log-uniform") => Some(Distribution::LogUniform),
             Some("normal") => Some(Distribution::Normal),
             _ => {
-                reader.expected("distribution", "one of \"uniform\", \"log-uniform\", \"normal\"", node.span());
+                reader.expected(
+                    "distribution",
+                    "one of \"uniform\", \"log-uniform\", \"normal\"",
+                    node.span(),
+                );
                 None
             }
         },
@@ -149,7 +166,7 @@ fn needed<T>(
     read: impl Fn(&mut Reader, &Table<'_, '_>) -> Option<T>,
 ) -> Option<T> {
     if table.get(key).is_none() {
-        reader.missing(table, what);
+        reader.missing(table, &[key], what);
         return None;
     }
     read(reader, table)
@@ -166,7 +183,7 @@ fn numbers(
     reader: &mut Reader,
     given: &Steps,
     span: &std::ops::Range<usize>,
-    max_jobs: u64,
+    budget: &mut Budget,
 ) -> Option<Vec<f64>> {
     let count = match given {
         Steps::Values(values) => values.len() as u64,
@@ -174,8 +191,13 @@ fn numbers(
         Steps::Random(r) => r.count,
         Steps::Sobol(s) => s.count,
     };
-    if count > max_jobs {
-        reader.note(ManifestError::TooManyJobs { jobs: count, limit: max_jobs }, span.clone());
+    if budget.is_spent {
+        return None;
+    }
+    let jobs = budget.jobs.saturating_mul(count);
+    if jobs > budget.max_jobs {
+        budget.is_spent = true;
+        reader.note(ManifestError::TooManyJobs { jobs, limit: budget.max_jobs }, span.clone());
         return None;
     }
     let computed = match *given {
@@ -203,7 +225,11 @@ fn listed_points(reader: &mut Reader, reach: &Reach, values: &[Located<Value>]) 
                     continue;
                 }
                 _ => {
-                    reader.expected("values", "a list of lists with one value a path each", value.span.clone());
+                    reader.expected(
+                        "values",
+                        "a list of lists with one value a path each",
+                        value.span.clone(),
+                    );
                     continue;
                 }
             },
@@ -247,7 +273,8 @@ fn labelled(
 ) -> Option<Vec<Point>> {
     if let Some(labels) = labels {
         if labels.len() != points.len() {
-            let span = labels.first().zip(labels.last()).map(|(a, b)| a.span.start..b.span.end).unwrap_or(0..0);
+            let span =
+                labels.first().zip(labels.last()).map(|(a, b)| a.span.start..b.span.end).unwrap_or(0..0);
             let error = ManifestError::LabelCount { labels: labels.len(), values: points.len() };
             reader.errors.push(Diagnostic::new(error, span));
             return None;

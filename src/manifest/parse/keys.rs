@@ -2,8 +2,20 @@
 
 /// The top of the file.
 pub(in crate::manifest) const MANIFEST: &[&str] = &[
-    "name", "scene", "set", "axis", "exclude", "max_jobs", "render", "camera", "environment", "light", "material",
-    "sheet", "compare", "output",
+    "name",
+    "scene",
+    "set",
+    "axis",
+    "exclude",
+    "max_jobs",
+    "render",
+    "camera",
+    "environment",
+    "light",
+    "material",
+    "sheet",
+    "compare",
+    "output",
 ];
 /// `[[axis]]`.
 pub(in crate::manifest) const AXIS: &[&str] =
@@ -23,6 +35,25 @@ pub(in crate::manifest) const SHEET: &[&str] = &["columns", "rows", "title", "ce
 pub(in crate::manifest) const DISPLAY: &[&str] = &["tone", "exposure"];
 /// `[compare]`.
 pub(in crate::manifest) const COMPARE: &[&str] = &[
-    "references", "fail", "failpercent", "failrelative", "hardfail", "allowfailures", "warn", "warnpercent",
-    "warnrelative", "hardwarn", "mean", "rms",
+    "references",
+    "fail",
+    "failpercent",
+    "failrelative",
+    "hardfail",
+    "allowfailures",
+    "warn",
+    "warnpercent",
+    "warnrelative",
+    "hardwarn",
+    "mean",
+    "rms",
+];
+
+/// The keys that people look for at the top or in another table.
+pub(in crate::manifest) const HOMES: &[(&str, &[&str])] = &[
+    ("[render]", &["width", "height", "spp", "replicates", "seed", "max_depth", "filter", "filter_radius"]),
+    ("[sheet]", &["columns", "rows", "cell_width"]),
+    ("[sheet.display]", DISPLAY),
+    ("[compare]", COMPARE),
+    ("[[axis]]", &["values", "labels", "range", "log_range", "random", "sobol", "zip"]),
 ];

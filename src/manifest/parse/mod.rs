@@ -25,6 +25,10 @@ use crate::settings::{Display, RenderSettings, ToneCurve};
 
 /// The largest manifest that is read, in bytes.
 const MAX_SIZE: u64 = 16 << 20;
+/// The largest number of axes.
+const MAX_AXES: usize = 64;
+/// The largest number of `exclude` tables: each is held against each job.
+const MAX_EXCLUDES: usize = 256;
 
 impl Manifest {
     /// Reads a manifest.
@@ -73,7 +77,8 @@ fn manifest(reader: &mut Reader, tree: &DeTable<'_>, source: Source) -> Manifest
     let name = top.get("name").and_then(|n| reader.text("name", n)).map(|n| n.value);
     let (scenes, scene_is_axis) = scenes(reader, &top);
     let mut short = |key: &str| top.get(key).map(|n| reader.settings(key, key, n)).unwrap_or_default();
-    let [camera, environment, light, material] = ["camera", "environment", "light", "material"].map(&mut short);
+    let [camera, environment, light, material] =
+        ["camera", "environment", "light", "material"].map(&mut short);
     let set = top.get("set").map(|n| reader.settings("", "set", n)).unwrap_or_default();
     let (render, render_camera) = render(reader, &top);
     let (axes, all_axes_sound) = axes(reader, &top, max_jobs);
@@ -111,7 +116,8 @@ fn scenes(reader: &mut Reader, top: &Table<'_, '_>) -> (Vec<Located<String>>, bo
     match top.get("scene") {
         None => (Vec::new(), false),
         Some(node) if matches!(node.get_ref(), DeValue::Array(_)) => {
-            let items = reader.items("scene", "a file, or a list of files, at least one", node).unwrap_or_default();
+            let items =
+                reader.items("scene", "a file, or a list of files, at least one", node).unwrap_or_default();
             (items.iter().filter_map(|item| reader.text("scene", item)).collect(), true)
         }
         Some(node) => match reader.text("scene", node) {
@@ -155,7 +161,12 @@ fn axes(reader: &mut Reader, top: &Table<'_, '_>, max_jobs: u64) -> (Vec<Axis>, 
         reader.expected("axis", "one or several tables: write `[[axis]]`", node.span());
         return (Vec::new(), false);
     };
-    let axes: Vec<Axis> = nodes.iter().filter_map(|n| axis::axis(reader, n, max_jobs)).collect();
+    if nodes.len() > MAX_AXES {
+        reader.expected("axis", format!("given at most {MAX_AXES} times"), node.span());
+        return (Vec::new(), false);
+    }
+    let mut budget = axis::Budget { jobs: 1, max_jobs, is_spent: false };
+    let axes: Vec<Axis> = nodes.iter().filter_map(|n| axis::axis(reader, n, &mut budget)).collect();
     let all_sound = axes.len() == nodes.len();
     (axes, all_sound)
 }
@@ -167,10 +178,17 @@ fn exclude(reader: &mut Reader, top: &Table<'_, '_>) -> Vec<Located<Vec<Setting>
         reader.expected("exclude", "a list of tables: write `[[exclude]]`", node.span());
         return Vec::new();
     };
+    if nodes.len() > MAX_EXCLUDES {
+        reader.expected("exclude", format!("given at most {MAX_EXCLUDES} times"), node.span());
+        return Vec::new();
+    }
     let rule = |reader: &mut Reader, node: &Node<'_>| {
         let settings = reader.settings("", "exclude", node);
         if settings.is_empty() && matches!(node.get_ref(), DeValue::Table(_)) {
-            reader.note(ManifestError::Missing { table: "[[exclude]]", what: "an axis with a value" }, node.span());
+            reader.note(
+                ManifestError::Missing { table: "[[exclude]]", what: "an axis with a value" },
+                node.span(),
+            );
         }
         Located::new(settings, node.span())
     };
@@ -211,14 +229,15 @@ fn compare(reader: &mut Reader, node: &Node<'_>) -> Option<CompareSpec> {
     let references = match t.get("references") {
         Some(node) => reader.text("references", node),
         None => {
-            reader.missing(&t, "`references`, the folder of the reference images");
+            reader.missing(&t, &["references"], "`references`, the folder of the reference images");
             None
         }
     };
     let allowfailures = reader.whole(&t, "allowfailures", 0..=u64::from(u32::MAX));
     let mut limit = |key: &str| reader.number(&t, key, 0.0..=f64::MAX);
     let [fail, failrelative, hardfail, warn, warnrelative, hardwarn, mean, rms] =
-        ["fail", "failrelative", "hardfail", "warn", "warnrelative", "hardwarn", "mean", "rms"].map(&mut limit);
+        ["fail", "failrelative", "hardfail", "warn", "warnrelative", "hardwarn", "mean", "rms"]
+            .map(&mut limit);
     let [failpercent, warnpercent] =
         ["failpercent", "warnpercent"].map(|key| reader.number(&t, key, 0.0..=100.0));
     let references = PathBuf::from(references?.value);
@@ -272,7 +291,7 @@ fn check_scene(reader: &mut Reader, top: &Table<'_, '_>, manifest: &Manifest) {
             let twice = Diagnostic::new(ManifestError::Twice { path: "scene".into() }, axis.span.clone());
             reader.errors.push(twice.and(node.span(), "first here"));
         }
-        (None, None) => reader.missing(top, "`scene`, the file to render"),
+        (None, None) => reader.missing(top, &["scene"], "`scene`, the file to render"),
         _ => {}
     }
 }
@@ -293,9 +312,11 @@ fn check_axis_names(reader: &mut Reader, manifest: &Manifest) {
         }
     }
     if let (Some(columns), Some(rows)) = (&manifest.sheet.columns, &manifest.sheet.rows)
+        && manifest.axis_id(&columns.value).is_some()
         && manifest.axis_id(&columns.value) == manifest.axis_id(&rows.value)
     {
-        let twice = Diagnostic::new(ManifestError::Twice { path: "axis of the sheet".into() }, rows.span.clone());
+        let twice =
+            Diagnostic::new(ManifestError::Twice { path: "axis of the sheet".into() }, rows.span.clone());
         reader.errors.push(twice.and(columns.span.clone(), "first here"));
     }
     let mut ids: BTreeMap<String, Range<usize>> = BTreeMap::new();

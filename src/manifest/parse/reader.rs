@@ -29,6 +29,8 @@ pub(super) struct Table<'a, 'i> {
     /// Its header, or all of it.
     pub(super) span: Range<usize>,
     keys: &'static [&'static str],
+    /// What its unknown keys were probably meant to be.
+    meant: Vec<&'static str>,
 }
 
 impl<'a, 'i> Table<'a, 'i> {
@@ -61,17 +63,23 @@ impl Reader {
         name: &'static str,
         keys: &'static [&'static str],
     ) -> Table<'a, 'i> {
-        for (key, _) in table.iter().filter(|(key, _)| !keys.contains(&&*key.get_ref().as_ref())) {
+        let mut meant = Vec::new();
+        for (key, _) in table.iter().filter(|(key, _)| !keys.contains(&key.get_ref().as_ref())) {
             let text: &str = key.get_ref();
+            let belongs =
+                super::keys::HOMES.iter().find(|(home, keys)| *home != name && keys.contains(&text));
+            let near = if belongs.is_some() { None } else { nearest(text, keys.iter().copied()) };
+            meant.extend(near);
             let error = ManifestError::UnknownKey {
                 key: text.into(),
                 table: name,
-                nearest: nearest(text, keys.iter().copied()),
+                nearest: near,
+                belongs: belongs.map(|(home, _)| *home),
                 known: keys,
             };
             self.note(error, key.span());
         }
-        Table { table, name, span, keys }
+        Table { table, name, span, keys, meant }
     }
 
     /// A value that must be a table with these keys.
@@ -148,7 +156,12 @@ impl Reader {
     }
 
     /// A whole number of the table in `range`.
-    pub(super) fn whole(&mut self, table: &Table<'_, '_>, key: &str, range: RangeInclusive<u64>) -> Option<u64> {
+    pub(super) fn whole(
+        &mut self,
+        table: &Table<'_, '_>,
+        key: &str,
+        range: RangeInclusive<u64>,
+    ) -> Option<u64> {
         let node = table.get(key)?;
         let number = match node.get_ref() {
             DeValue::Integer(integer) => whole_number(integer).and_then(|n| u64::try_from(n).ok()),
@@ -164,8 +177,11 @@ impl Reader {
         }
     }
 
-    /// Notes that `table` lacks `what`.
-    pub(super) fn missing(&mut self, table: &Table<'_, '_>, what: &'static str) {
+    /// Notes that `table` lacks `what`, one of `keys`; unless one of them is there and only misspelt.
+    pub(super) fn missing(&mut self, table: &Table<'_, '_>, keys: &[&str], what: &'static str) {
+        if table.meant.iter().any(|meant| keys.contains(meant)) {
+            return;
+        }
         self.note(ManifestError::Missing { table: table.name, what }, table.span.clone());
     }
 
