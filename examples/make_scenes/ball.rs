@@ -6,12 +6,12 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use pipeline::math::Real;
 use serde_json::json;
 
-use super::glb::{Glb, Precision, Wrap};
+use super::glb::{Glb, Wrap};
 use super::mesh::{Boundary, Mesh};
 use super::revolve::Profile;
 use super::shell;
 use super::studio::{Softbox, Sweep};
-use super::{MakeError, Made};
+use super::{Made, MakeError};
 
 /// Where the port looks.
 const PORT_AXIS: DVec3 = DVec3::new(-0.36, 0.42, 0.83);
@@ -39,11 +39,11 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
     let right = DVec3::Y.cross(axis).normalize();
     let orientation = DQuat::from_mat3(&DMat3::from_cols(right, axis.cross(right), axis));
     let shell = shell::mesh(orientation).checked("ball", Boundary::Closed)?.moved(up);
-    glb.mesh("ball", &shell, ball, Precision::Full);
-    glb.mesh("inner", &inner_sphere().checked("inner", Boundary::Closed)?.moved(up), inner, Precision::Full);
-    glb.mesh("base", &base.revolve(128).checked("base", Boundary::Closed)?, base_material, Precision::Full);
+    glb.mesh("ball", &shell, ball);
+    glb.mesh("inner", &inner_sphere().checked("inner", Boundary::Closed)?.moved(up), inner);
+    glb.mesh("base", &base.revolve(128).checked("base", Boundary::Closed)?, base_material);
     let sweep = Sweep { half_width: 9.0, front: 9.0, back: -3.5, radius: 2.5, height: 7.0, tile: FLOOR_SIDE };
-    glb.mesh("floor", &sweep.mesh().checked("floor", Boundary::Open)?, floor, Precision::Full);
+    glb.mesh("floor", &sweep.mesh().checked("floor", Boundary::Open)?, floor);
 
     let target = DVec3::new(0.0, 1.0, 0.0);
     let lights = [
@@ -53,7 +53,7 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
             target,
             size: [2.4, 2.4],
             color: [1.0, 0.97, 0.92],
-            radiance: 12.0,
+            radiance: 22.0,
         },
         Softbox {
             name: "fill_light",
@@ -61,7 +61,7 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
             target,
             size: [2.0, 3.2],
             color: [0.9, 0.95, 1.0],
-            radiance: 3.0,
+            radiance: 6.0,
         },
         Softbox {
             name: "rim_light",
@@ -69,13 +69,13 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
             target,
             size: [3.0, 1.2],
             color: [1.0, 1.0, 1.0],
-            radiance: 10.0,
+            radiance: 20.0,
         },
     ];
     for light in &lights {
         light.add(&mut glb);
     }
-    glb.camera(DVec3::new(1.1, 2.35, 5.6), DVec3::new(0.0, 0.98, 0.0), 30.0, 4.0 / 3.0);
+    glb.camera(DVec3::new(1.05, 2.3, 5.25), DVec3::new(0.0, 1.03, 0.0), 30.0, 4.0 / 3.0);
     let about = format!("{} triangles, {} of them the ball's", glb.triangles(), shell.triangles.len());
     Ok(vec![Made { path: "shaderball.glb", bytes: glb.finish("shaderball")?, about }])
 }
@@ -84,11 +84,18 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
 fn inner_sphere() -> Mesh {
     let (stem, flow) = (0.11, 0.12);
     // The flow's arc touches the sphere and the stem from outside.
-    let middle = DVec2::new(stem + flow, -((INNER + flow) * (INNER + flow) - (stem + flow) * (stem + flow)).sqrt());
+    let middle =
+        DVec2::new(stem + flow, -((INNER + flow) * (INNER + flow) - (stem + flow) * (stem + flow)).sqrt());
     let touch = Real::atan2(middle.y, middle.x);
     let foot = -(shell::INSIDE * shell::INSIDE - 0.24 * 0.24f64).sqrt() + 0.004;
     let mut profile = Profile::corners(
-        &[[0.0, foot, 0.0], [0.235, foot, 0.012], [0.235, foot + 0.035, 0.012], [stem, foot + 0.035, 0.03], [stem, middle.y, 0.0]],
+        &[
+            [0.0, foot, 0.0],
+            [0.235, foot, 0.012],
+            [0.235, foot + 0.035, 0.012],
+            [stem, foot + 0.035, 0.03],
+            [stem, middle.y, 0.0],
+        ],
         0.05,
     );
     // Upwards along the stem, right around the flow, then left around the sphere to the top.
@@ -135,7 +142,7 @@ const FIELD: u32 = FLOOR_TEXELS / 24;
 const DARK: u8 = 124;
 const BRIGHT: u8 = 188;
 const PAPER: u8 = 160;
-/// sRGB codes of the patches in front: six greys of linear 0.0203, 0.0497, 0.1022, 0.2016, 0.4020, 0.8069 and six colours.
+/// sRGB codes of the patches beside the ball: six greys of linear 0.0203, 0.0497, 0.1022, 0.2016, 0.4020, 0.8069 and six colours.
 const PATCHES: [[u8; 3]; 12] = [
     [39, 39, 39],
     [63, 63, 63],
@@ -151,16 +158,19 @@ const PATCHES: [[u8; 3]; 12] = [
     [8, 133, 161],
 ];
 
-/// The floor seen from above, the camera's side down: a chessboard that fades into plain paper, and a row of patches.
+/// The floor seen from above, the camera's side down: a chessboard that fades into plain paper, and twelve patches.
 fn floor_texel(x: u32, y: u32) -> [u8; 3] {
     let half = FLOOR_TEXELS / 2;
-    // Patches of a third of a field in the row of fields that begins 1.5 m in front of the middle.
-    let (patch, gap) = (FIELD / 2, FIELD / 8);
-    let step = patch + gap;
-    let width = PATCHES.len() as u32 * step;
-    let (left, top) = (half - width / 2 + gap / 2, half + 3 * FIELD + FIELD / 4);
-    if (top..top + patch).contains(&y) && (left..left + width).contains(&x) && (x - left) % step < patch {
-        return PATCHES[((x - left) / step) as usize];
+    // Greys on the left and colours on the right, each in the middle of a field.
+    let (column, row) = ((x / FIELD) as i32 - 12, (y / FIELD) as i32 - 12);
+    let inside = |t: u32| (FIELD / 4..FIELD * 3 / 4).contains(&(t % FIELD));
+    if inside(x) && inside(y) && (-1..2).contains(&row) {
+        let row = row + 1;
+        match column {
+            -4 | -3 => return PATCHES[(row * 2 + column + 4) as usize],
+            2 | 3 => return PATCHES[(6 + row * 2 + column - 2) as usize],
+            _ => {}
+        }
     }
     let field = if (x / FIELD + y / FIELD) % 2 == 0 { DARK } else { BRIGHT };
     let from_middle = |t: u32| (f64::from(t) + 0.5) / f64::from(half) - 1.0;

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use super::mesh::{Mesh, MeshError, geodesic_sphere, rectangle};
-use super::{MakeError, Made};
+use super::{Made, MakeError};
 
 const HALF_WIDTH: f64 = 1.0;
 const HEIGHT: f64 = 1.6;
@@ -36,7 +36,8 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
     let parts = parts()?;
     let triangles: usize = parts.iter().map(|p| p.mesh.triangles.len()).sum();
     let about = format!("{triangles} triangles");
-    let file = |path, text: String, about: &str| Made { path, bytes: text.into_bytes(), about: about.to_owned() };
+    let file =
+        |path, text: String, about: &str| Made { path, bytes: text.into_bytes(), about: about.to_owned() };
     let mut made = vec![
         file("cornell.obj", obj(&parts), &about),
         file("cornell.mtl", mtl(), "Lambert, the light emits 40"),
@@ -49,7 +50,8 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
         made.push(file(brdf, brdf_yaml(&left, &right), about));
     }
     for part in &parts {
-        let mut text = "# The Cornell box of disney-pipeline, made by its example make_scenes. CC0 1.0.\n".to_owned();
+        let mut text =
+            "# The Cornell box of disney-pipeline, made by its example make_scenes. CC0 1.0.\n".to_owned();
         Numbers::default().write(&mut text, part);
         let about = format!("{} triangles", part.mesh.triangles.len());
         made.push(Made { path: part.file, bytes: text.into_bytes(), about });
@@ -139,8 +141,14 @@ fn obj(parts: &[Part]) -> String {
 
 fn mtl() -> String {
     let mut text = "# Lambert throughout (illum 1, no Ks): what Aris calls diffuse. CC0 1.0.\n".to_owned();
-    let colors =
-        [("white", WHITE), ("blue", BLUE), ("red", RED), ("ball_left", YELLOW), ("ball_right", CYAN), ("light", LIGHT)];
+    let colors = [
+        ("white", WHITE),
+        ("blue", BLUE),
+        ("red", RED),
+        ("ball_left", YELLOW),
+        ("ball_right", CYAN),
+        ("light", LIGHT),
+    ];
     for (name, [r, g, b]) in colors {
         let _ = write!(text, "\nnewmtl {name}\nKd {r} {g} {b}\n");
         if name == "light" {
@@ -202,7 +210,8 @@ const GROUPS: [(&str, &str); 4] = [
 fn variants() -> [(&'static str, &'static str, [String; 2], &'static str); 4] {
     let mirror = "- name: mirror\n  config: {}\n".to_owned();
     let glass = "- name: dielectric\n  config:\n    ext_ior: 1.000277\n    int_ior: 1.5046\n".to_owned();
-    let pink = Disney { color: [1.0, 0.4, 0.7], roughness: 0.2, metallic: 0.6, clearcoat: 1.0, ..Disney::default() };
+    let pink =
+        Disney { color: [1.0, 0.4, 0.7], roughness: 0.2, metallic: 0.6, clearcoat: 1.0, ..Disney::default() };
     let green = Disney { color: [0.2, 1.0, 0.1], roughness: 1.0, subsurface: 1.0, ..Disney::default() };
     let copper = |roughness| Disney {
         color: [0.955, 0.637, 0.538],
@@ -219,7 +228,12 @@ fn variants() -> [(&'static str, &'static str, [String; 2], &'static str); 4] {
             [diffuse(YELLOW), diffuse(CYAN)],
             "Lambert: the same picture as cornell.obj",
         ),
-        ("aris/config/scene/cbox_balls.yaml", "cbox_balls", [pink.yaml(), green.yaml()], "Pink and Green Balls"),
+        (
+            "aris/config/scene/cbox_balls.yaml",
+            "cbox_balls",
+            [pink.yaml(), green.yaml()],
+            "Pink and Green Balls",
+        ),
         (
             "aris/config/scene/cbox_copper.yaml",
             "cbox_copper",

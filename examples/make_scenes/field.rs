@@ -22,8 +22,12 @@ pub(crate) trait Field {
     /// The surface point that Newton steps along the gradient lead to from a point nearby.
     fn project(&self, mut p: DVec3) -> DVec3 {
         for _ in 0..12 {
+            let value = self.at(p);
+            if value.abs() < 1e-11 {
+                break;
+            }
             let gradient = self.gradient(p);
-            p -= gradient * (self.at(p) / gradient.length_squared().max(1e-6));
+            p -= gradient * (value / gradient.length_squared().max(1e-6));
         }
         p
     }
@@ -38,11 +42,6 @@ impl<F: Fn(DVec3) -> f64> Field for F {
 /// The intersection of two solids, its convex edge rounded with radius `r`.
 pub(crate) fn round_max(a: f64, b: f64, r: f64) -> f64 {
     a.max(b).min(-r) + DVec2::new(a + r, b + r).max(DVec2::ZERO).length()
-}
-
-/// The union of two solids, its concave edge filled with radius `r`.
-pub(crate) fn round_min(a: f64, b: f64, r: f64) -> f64 {
-    -round_max(-a, -b, r)
 }
 
 /// The union of two solids that flow into each other over a width of about `k` (Quilez, cubic polynomial smooth minimum:

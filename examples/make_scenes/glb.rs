@@ -27,15 +27,6 @@ pub(crate) enum GlbError {
     Gzip(#[from] std::io::Error),
 }
 
-/// How many bits of positions and normals are kept.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Precision {
-    /// All of `f32`.
-    Full,
-    /// Positions on a grid of 2⁻¹³, normals on one of 2⁻⁹: so that gzip finds something to do.
-    Rounded,
-}
-
 /// What textures do outside of [0, 1].
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wrap {
@@ -105,7 +96,10 @@ impl Glb {
         texel: impl Fn(u32, u32) -> [u8; N],
         wrap: Wrap,
     ) -> Result<usize, GlbError> {
-        let pixels: Vec<u8> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
+        let pixels: Vec<u8> = (0..height)
+            .flat_map(|y| (0..width).map(move |x| (x, y)))
+            .flat_map(|(x, y)| texel(x, y))
+            .collect();
         let color = if N == 4 { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
         let mut bytes = Cursor::new(vec![]);
         png::PngEncoder::new_with_quality(&mut bytes, png::CompressionType::Best, png::FilterType::Adaptive)
@@ -115,27 +109,24 @@ impl Glb {
         self.images.push(json!({ "name": name, "bufferView": view, "mimeType": "image/png" }));
         let wrap = if wrap == Wrap::Repeat { 10_497 } else { 33_071 };
         self.samplers.push(json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": wrap, "wrapT": wrap }));
-        self.textures.push(json!({ "name": name, "source": self.images.len() - 1, "sampler": self.samplers.len() - 1 }));
+        self.textures.push(
+            json!({ "name": name, "source": self.images.len() - 1, "sampler": self.samplers.len() - 1 }),
+        );
         Ok(self.textures.len() - 1)
     }
 
     /// Adds a mesh with its node, both called `name`.
-    pub(crate) fn mesh(&mut self, name: &str, mesh: &Mesh, material: usize, precision: Precision) {
+    pub(crate) fn mesh(&mut self, name: &str, mesh: &Mesh, material: usize) {
         self.triangles += mesh.triangles.len();
-        let primitives: Vec<Value> =
-            mesh.parts().iter().map(|part| self.primitive(part, material, precision)).collect();
+        let primitives: Vec<Value> = mesh.parts().iter().map(|part| self.primitive(part, material)).collect();
         self.meshes.push(json!({ "name": name, "primitives": primitives }));
         self.nodes.push(json!({ "name": name, "mesh": self.meshes.len() - 1 }));
     }
 
-    fn primitive(&mut self, mesh: &Mesh, material: usize, precision: Precision) -> Value {
-        let (position, normal): (fn(DVec3) -> DVec3, fn(DVec3) -> DVec3) = match precision {
-            Precision::Full => (|p| p, |n| n),
-            Precision::Rounded => (|p| (p * 8192.0).round() / 8192.0, nine_bit_normal),
-        };
+    fn primitive(&mut self, mesh: &Mesh, material: usize) -> Value {
         let mut attributes = json!({
-            "POSITION": self.floats(mesh.positions.iter().map(|&p| position(p).to_array()), Bounds::Stated),
-            "NORMAL": self.floats(mesh.normals.iter().map(|&n| normal(n).to_array()), Bounds::Omitted),
+            "POSITION": self.floats(mesh.positions.iter().map(|p| p.to_array()), Bounds::Stated),
+            "NORMAL": self.floats(mesh.normals.iter().map(|n| n.to_array()), Bounds::Omitted),
         });
         if !mesh.uvs.is_empty() {
             attributes["TEXCOORD_0"] = json!(self.floats(mesh.uvs.iter().copied(), Bounds::Omitted));
@@ -264,9 +255,4 @@ impl Glb {
 enum Bounds {
     Stated,
     Omitted,
-}
-
-/// `n` on a grid of 2⁻⁹: at most 0.2° off and 0.002 longer or shorter, well inside the specification's tolerance.
-fn nine_bit_normal(n: DVec3) -> DVec3 {
-    (n * 512.0).round() / 512.0
 }

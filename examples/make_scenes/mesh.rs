@@ -25,8 +25,8 @@ pub(crate) enum MeshError {
     Winding { mesh: &'static str, count: usize },
     #[error("mesh \"{mesh}\": expected a closed surface, found {count} edges without a partner")]
     Open { mesh: &'static str, count: usize },
-    #[error("mesh \"{mesh}\": vertex {vertex} is not finite")]
-    NotFinite { mesh: &'static str, vertex: usize },
+    #[error("mesh \"{mesh}\": vertex {vertex} is not finite or its normal is no unit vector")]
+    Vertex { mesh: &'static str, vertex: usize },
 }
 
 /// Whether a surface has a boundary.
@@ -116,6 +116,14 @@ impl Mesh {
         self
     }
 
+    /// The mesh with positions on a grid of 2⁻¹³ and normals on one of 2⁻⁹ (at most 0.2° off, 0.002 longer or shorter): so
+    /// that gzip finds something to do.
+    pub(crate) fn rounded(mut self) -> Self {
+        self.positions.iter_mut().for_each(|p| *p = (*p * 8192.0).round() / 8192.0);
+        self.normals.iter_mut().for_each(|n| *n = (*n * 512.0).round() / 512.0);
+        self
+    }
+
     /// Edges that are not shared by exactly two triangles in opposite directions, once vertices at the same place are one.
     pub(crate) fn open_edges(&self) -> usize {
         let mut places = BTreeMap::new();
@@ -143,13 +151,13 @@ impl Mesh {
 
     /// The mesh, when it is as it should be.
     pub(crate) fn checked(self, mesh: &'static str, boundary: Boundary) -> Result<Self, MeshError> {
-        let finite = |i: usize| {
+        let sound = |i: usize| {
             self.positions[i].is_finite()
-                && self.normals[i].is_normalized()
+                && (self.normals[i].length() - 1.0).abs() < 0.003
                 && self.uvs.get(i).is_none_or(|uv| uv.iter().all(|x| x.is_finite()))
         };
-        if let Some(vertex) = (0..self.positions.len()).find(|&i| !finite(i)) {
-            return Err(MeshError::NotFinite { mesh, vertex });
+        if let Some(vertex) = (0..self.positions.len()).find(|&i| !sound(i)) {
+            return Err(MeshError::Vertex { mesh, vertex });
         }
         match self.triangles.iter().filter(|&&t| !self.faces_its_normals(t)).count() {
             0 => {}
@@ -211,7 +219,8 @@ pub(crate) fn geodesic_sphere(center: DVec3, radius: f64, frequency: usize) -> M
         corners.push(DVec3::new(0.0, a, b).normalize());
         corners.push(DVec3::new(b, 0.0, a).normalize());
     }
-    let edge = (0..12).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| corners[i].distance(corners[j]));
+    let edge =
+        (0..12).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| corners[i].distance(corners[j]));
     let edge = edge.fold(f64::INFINITY, f64::min) * 1.001;
     let mut mesh = Mesh::default();
     let mut places = BTreeMap::new();
@@ -240,7 +249,8 @@ pub(crate) fn geodesic_sphere(center: DVec3, radius: f64, frequency: usize) -> M
                         let up = [at(p, q), at(p + 1, q), at(p, q + 1)].map(|d| vertex(&mut mesh, d));
                         mesh.triangles.push(up);
                         if p + q + 1 < frequency {
-                            let down = [at(p + 1, q), at(p + 1, q + 1), at(p, q + 1)].map(|d| vertex(&mut mesh, d));
+                            let down =
+                                [at(p + 1, q), at(p + 1, q + 1), at(p, q + 1)].map(|d| vertex(&mut mesh, d));
                             mesh.triangles.push(down);
                         }
                     }
@@ -267,7 +277,10 @@ mod tests {
     fn a_rectangle_is_open_and_a_turned_triangle_is_found() {
         let sheet = rectangle(DVec3::ZERO, DVec3::X, DVec3::Y);
         assert_eq!(sheet.open_edges(), 4);
-        assert!(matches!(sheet.clone().checked("sheet", Boundary::Closed), Err(MeshError::Open { count: 4, .. })));
+        assert!(matches!(
+            sheet.clone().checked("sheet", Boundary::Closed),
+            Err(MeshError::Open { count: 4, .. })
+        ));
         let mut turned = sheet;
         turned.triangles[0].swap(0, 1);
         assert!(matches!(turned.checked("sheet", Boundary::Open), Err(MeshError::Winding { count: 1, .. })));

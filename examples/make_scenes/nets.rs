@@ -1,5 +1,7 @@
 //! Surface nets: polygons from a field, with vertices on the surface and normals from the field's gradient.
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
 
 use super::field::Field;
@@ -16,12 +18,15 @@ pub(crate) struct Lattice {
 }
 
 /// The field's surface inside of the lattice: one vertex a cell that the surface crosses (Gibson 1998, "Constrained Elastic
-/// Surface Nets"), put at the mean of the crossings on the cell's edges and projected to the surface, and one quad for each
-/// crossed edge, cut along its shorter diagonal.
+/// Surface Nets"), put at the mean of the crossings on the cell's edges, and one quad for each crossed edge, cut along its
+/// shorter diagonal. Vertices are then spread evenly and projected to the surface; folds at creases
+/// too sharp for the cells are smoothed away.
 pub(crate) fn polygonise(field: &impl Field, lattice: &Lattice) -> Mesh {
     let size = ((lattice.end - lattice.origin) / lattice.cell).ceil();
     let [nx, ny, nz] = [size.x as usize + 1, size.y as usize + 1, size.z as usize + 1];
-    let corner = |x: usize, y: usize, z: usize| lattice.origin + DVec3::new(x as f64, y as f64, z as f64) * lattice.cell;
+    let corner = |x: usize, y: usize, z: usize| {
+        lattice.origin + DVec3::new(x as f64, y as f64, z as f64) * lattice.cell
+    };
     // Heights are outermost, so that vertices follow each other from bottom to top.
     let index = |x: usize, y: usize, z: usize| (y * nz + z) * nx + x;
     let mut values = Vec::with_capacity(nx * ny * nz);
@@ -41,17 +46,19 @@ pub(crate) fn polygonise(field: &impl Field, lattice: &Lattice) -> Mesh {
                     continue;
                 }
                 let (mut sum, mut crossings) = (DVec3::ZERO, 0.0);
-                for (a, b) in (0..8usize).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))).filter(|(a, b)| a != b) {
+                for (a, b) in
+                    (0..8usize).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))).filter(|(a, b)| a != b)
+                {
                     if (at(a) < 0.0) != (at(b) < 0.0) {
-                        let place = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
+                        let place =
+                            |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
                         sum += place(a).lerp(place(b), at(a) / (at(a) - at(b)));
                         crossings += 1.0;
                     }
                 }
-                let position = field.project(corner(x, y, z) + sum / crossings * lattice.cell);
                 vertex[index(x, y, z)] = mesh.positions.len() as u32;
-                mesh.positions.push(position);
-                mesh.normals.push(field.normal(position));
+                mesh.positions.push(corner(x, y, z) + sum / crossings * lattice.cell);
+                mesh.normals.push(DVec3::ZERO);
             }
         }
     }
@@ -73,13 +80,86 @@ pub(crate) fn polygonise(field: &impl Field, lattice: &Lattice) -> Mesh {
             }
         }
     }
+    let moving = vec![true; mesh.positions.len()];
+    for _ in 0..RELAXATIONS {
+        mesh.relax(field, &moving, 0.5);
+    }
+    for _ in 0..UNFOLDINGS {
+        let Some(folded) = mesh.triangles.iter().position(|&t| mesh.is_folded(t)) else { break };
+        let tt=mesh.triangles[folded]; let n0=mesh.triangles.len(); if mesh.triangles.len()<300000 {eprintln!("DBG {folded} {tt:?} {:?} n {:?} f {:?}", mesh.corners(tt), tt.map(|i|mesh.normals[i as usize]), mesh.corners(tt).map(|p|field.at(p)));}
+        mesh.collapse_an_edge(field, folded);
+ if n0==mesh.triangles.len(){eprintln!("DBG nocollapse");}
+        let moving = mesh.folded();
+        mesh.relax(field, &moving, 1.0);
+    }
     mesh
 }
 
+/// How often all vertices are spread evenly.
+const RELAXATIONS: usize = 6;
+/// How many folds are smoothed away at most, one after another.
+const UNFOLDINGS: usize = 200;
+
 impl Mesh {
+    /// Takes the `moving` vertices by `step` of the way to the mean of their neighbours and back to the surface: needles become
+    /// triangles.
+    fn relax(&mut self, field: &impl Field, moving: &[bool], step: f64) {
+        let mut means = vec![(DVec3::ZERO, 0.0); self.positions.len()];
+        for [a, b, c] in &self.triangles {
+            for (at, next) in [(a, b), (b, c), (c, a)] {
+                let mean = &mut means[*at as usize];
+                mean.0 += self.positions[*next as usize];
+                mean.1 += 1.0;
+            }
+        }
+        for (i, (sum, count)) in means.into_iter().enumerate().filter(|&(i, _)| moving[i]) {
+            self.positions[i] = field.project(self.positions[i].lerp(sum / count, step));
+            self.normals[i] = field.normal(self.positions[i]);
+        }
+    }
+
+    /// Whether a triangle leans more than 75° away from its normals.
+    fn is_folded(&self, triangle: [u32; 3]) -> bool {
+        let [a, b, c] = self.corners(triangle);
+        let normal: DVec3 = triangle.iter().map(|&i| self.normals[i as usize]).sum();
+        let across = (b - a).cross(c - a);
+        across.dot(normal) < 0.25 * across.length() * normal.length()
+    }
+
+    /// The corners of folded triangles.
+    fn folded(&self) -> Vec<bool> {
+        let mut folded = vec![false; self.positions.len()];
+        for triangle in self.triangles.iter().filter(|&&t| self.is_folded(t)).flatten() {
+            folded[*triangle as usize] = true;
+        }
+        folded
+    }
+
+    /// Makes one vertex of the shortest edge of a triangle that may go: one whose ends have two neighbours in common, so that
+    /// the surface stays a surface (Dey et al. 1999, the link condition).
+    fn collapse_an_edge(&mut self, field: &impl Field, triangle: usize) {
+        let at = |i: u32| self.positions[i as usize];
+        let [a, b, c] = self.triangles[triangle];
+        let mut edges = [(a, b), (b, c), (c, a)];
+        edges.sort_by(|e, f| at(e.0).distance(at(e.1)).total_cmp(&at(f.0).distance(at(f.1))));
+        let neighbours = |v: u32| -> BTreeSet<u32> {
+            self.triangles.iter().filter(|t| t.contains(&v)).flatten().copied().filter(|&i| i != v).collect()
+        };
+        let may_go = |&&(a, b): &&(u32, u32)| neighbours(a).intersection(&neighbours(b)).count() == 2;
+        let Some(&(stays, goes)) = edges.iter().find(may_go) else { return };
+        let middle = field.project((at(stays) + at(goes)) / 2.0);
+        self.positions[stays as usize] = middle;
+        self.normals[stays as usize] = field.normal(middle);
+        self.triangles.retain(|t| !(t.contains(&stays) && t.contains(&goes)));
+        for corner in self.triangles.iter_mut().flatten().filter(|i| **i == goes) {
+            *corner = stays;
+        }
+    }
+
     /// Two triangles, counter-clockwise seen from the side where `inside_first` says the edge leaves the solid.
     fn quad(&mut self, corners: [u32; 4], inside_first: bool) {
-        let [a, b, c, d] = if inside_first { corners } else { [corners[3], corners[2], corners[1], corners[0]] };
+        let [a, b, c, d] =
+            if inside_first { corners } else { [corners[3], corners[2], corners[1], corners[0]] };
         let at = |i: u32| self.positions[i as usize];
         let split = if at(a).distance_squared(at(c)) <= at(b).distance_squared(at(d)) {
             [[a, b, c], [a, c, d]]

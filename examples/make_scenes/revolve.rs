@@ -95,9 +95,16 @@ impl Profile {
             let radius = if pole { 0.0 } else { at.x };
             Vertex {
                 position: DVec3::new(radius * out, at.y, radius * z),
-                normal: if pole { DVec3::Y * normal.y.signum() } else { DVec3::new(normal.x * out, normal.y, normal.x * z) },
+                normal: if pole {
+                    DVec3::Y * normal.y.signum()
+                } else {
+                    DVec3::new(normal.x * out, normal.y, normal.x * z)
+                },
                 // A pole has one vertex a column: its u is that of the middle of the column's triangle.
-                uv: [(column as f64 - if pole { 0.5 } else { 0.0 }) / columns as f64, 1.0 - lengths[row] / total],
+                uv: [
+                    (column as f64 - if pole { 0.5 } else { 0.0 }) / columns as f64,
+                    1.0 - lengths[row] / total,
+                ],
             }
         })
     }
@@ -110,7 +117,8 @@ mod tests {
 
     #[test]
     fn a_bevelled_cylinder_is_closed_and_its_normals_lean_no_more_than_its_bevel() {
-        let profile = Profile::corners(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 0.5, 0.1], [0.0, 0.5, 0.0]], 1.0);
+        let profile =
+            Profile::corners(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 0.5, 0.1], [0.0, 0.5, 0.0]], 1.0);
         let cylinder = profile.revolve(24).checked("cylinder", Boundary::Closed).unwrap();
         for (p, n) in cylinder.positions.iter().zip(&cylinder.normals) {
             let beyond = DVec2::new((p.x * p.x + p.z * p.z).sqrt() - 0.9, (p.y - 0.25).abs() - 0.15);

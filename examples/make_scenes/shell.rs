@@ -204,7 +204,8 @@ pub(crate) fn mesh(orientation: DQuat) -> Mesh {
             let pole = i == 0 || i + 1 == rows.len();
             let guess = row.guess(&column);
             let position = if pole { DVec3::NEG_Z * guess.length() } else { solid.project(guess) };
-            let normal = if pole { DVec3::NEG_Z * if i == 0 { 1.0 } else { -1.0 } } else { solid.normal(position) };
+            let normal =
+                if pole { DVec3::NEG_Z * if i == 0 { 1.0 } else { -1.0 } } else { solid.normal(position) };
             walked += last.map_or(0.0, |last| last.distance(position));
             last = Some(position);
             points.push((position, normal, 1.0 - walked / PI, pole));

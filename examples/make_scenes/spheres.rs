@@ -3,11 +3,11 @@
 use glam::{DVec2, DVec3};
 use serde_json::json;
 
-use super::glb::{Glb, Precision, Wrap};
+use super::glb::{Glb, Wrap};
 use super::mesh::{Boundary, Mesh, rectangle};
 use super::revolve::Profile;
 use super::studio::Softbox;
-use super::{MakeError, Made};
+use super::{Made, MakeError};
 
 const RADIUS: f64 = 0.4;
 
@@ -15,7 +15,7 @@ const RADIUS: f64 = 0.4;
 pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
     let mut glb = Glb::default();
     let floor = glb.plain("floor", [0.5, 0.5, 0.5], 1.0);
-    glb.mesh("floor", &rectangle(DVec3::new(-4.0, 0.0, 3.0), DVec3::X * 8.0, -DVec3::Z * 6.0), floor, Precision::Full);
+    glb.mesh("floor", &rectangle(DVec3::new(-4.0, 0.0, 3.0), DVec3::X * 8.0, -DVec3::Z * 6.0), floor);
 
     // A red and yellow chessboard, and a disk that is cut out of white.
     let chess = |x: u32, y: u32| if (x + y) % 2 == 0 { [200, 30, 30] } else { [230, 200, 60] };
@@ -54,7 +54,7 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
         if name == "vertex_colored" {
             mesh.colors = mesh.normals.iter().map(|n| ((*n + DVec3::ONE) / 2.0).to_array()).collect();
         }
-        glb.mesh(name, &mesh, material, Precision::Full);
+        glb.mesh(name, &mesh, material);
     }
 
     let area = Softbox {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use pipeline::math::Real;
 
-use super::glb::{Glb, Precision};
+use super::glb::Glb;
 use super::mesh::{Mesh, Vertex, rectangle};
 
 /// A rectangular area light that faces a point.
@@ -30,7 +30,7 @@ impl Softbox {
         let up = forward.cross(right).normalize() * self.size[1];
         let quad = rectangle(self.position - (right + up) / 2.0, right, up);
         let material = glb.emissive(self.name, self.color, self.radiance);
-        glb.mesh(self.name, &quad, material, Precision::Full);
+        glb.mesh(self.name, &quad, material);
     }
 }
 
