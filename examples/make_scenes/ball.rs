@@ -142,7 +142,7 @@ const FIELD: u32 = FLOOR_TEXELS / 24;
 const DARK: u8 = 124;
 const BRIGHT: u8 = 188;
 const PAPER: u8 = 160;
-/// sRGB codes of the patches beside the ball: six greys of linear 0.0203, 0.0497, 0.1022, 0.2016, 0.4020, 0.8069 and six colours.
+/// sRGB codes of the patches beside the ball: six greys of linear 0.0203, 0.0497, 0.1022, 0.2016, 0.4020, 0.7991 and six colours.
 const PATCHES: [[u8; 3]; 12] = [
     [39, 39, 39],
     [63, 63, 63],
@@ -172,7 +172,7 @@ fn floor_texel(x: u32, y: u32) -> [u8; 3] {
             _ => {}
         }
     }
-    let field = if (x / FIELD + y / FIELD) % 2 == 0 { DARK } else { BRIGHT };
+    let field = if (x / FIELD + y / FIELD).is_multiple_of(2) { DARK } else { BRIGHT };
     let from_middle = |t: u32| (f64::from(t) + 0.5) / f64::from(half) - 1.0;
     let distance = DVec2::new(from_middle(x), from_middle(y)).length() * FLOOR_SIDE / 2.0;
     let fade = ((distance - 3.0) / 2.6).clamp(0.0, 1.0);

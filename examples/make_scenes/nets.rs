@@ -20,7 +20,7 @@ pub(crate) struct Lattice {
 /// The field's surface inside of the lattice: one vertex a cell that the surface crosses (Gibson 1998, "Constrained Elastic
 /// Surface Nets"), put at the mean of the crossings on the cell's edges, and one quad for each crossed edge, cut along its
 /// shorter diagonal. Vertices are then spread evenly and projected to the surface; folds at creases
-/// too sharp for the cells are smoothed away.
+/// too sharp for the cells are smoothed cut out.
 pub(crate) fn polygonise(field: &impl Field, lattice: &Lattice) -> Mesh {
     let size = ((lattice.end - lattice.origin) / lattice.cell).ceil();
     let [nx, ny, nz] = [size.x as usize + 1, size.y as usize + 1, size.z as usize + 1];
@@ -35,6 +35,8 @@ pub(crate) fn polygonise(field: &impl Field, lattice: &Lattice) -> Mesh {
             values.extend((0..nx).map(|x| field.at(corner(x, y, z))));
         }
     }
+
+    separate_sheets(&mut values, [nx, ny, nz]);
 
     let mut mesh = Mesh::default();
     let mut vertex = vec![u32::MAX; values.len()];
@@ -80,30 +82,58 @@ pub(crate) fn polygonise(field: &impl Field, lattice: &Lattice) -> Mesh {
             }
         }
     }
-    let moving = vec![true; mesh.positions.len()];
     for _ in 0..RELAXATIONS {
-        mesh.relax(field, &moving, 0.5);
+        mesh.relax(field);
     }
     for _ in 0..UNFOLDINGS {
         let Some(folded) = mesh.triangles.iter().position(|&t| mesh.is_folded(t)) else { break };
-        let tt=mesh.triangles[folded]; let n0=mesh.triangles.len(); if mesh.triangles.len()<300000 {eprintln!("DBG {folded} {tt:?} {:?} n {:?} f {:?}", mesh.corners(tt), tt.map(|i|mesh.normals[i as usize]), mesh.corners(tt).map(|p|field.at(p)));}
         mesh.collapse_an_edge(field, folded);
- if n0==mesh.triangles.len(){eprintln!("DBG nocollapse");}
-        let moving = mesh.folded();
-        mesh.relax(field, &moving, 1.0);
     }
     mesh
 }
 
+/// Changes the sign of the smallest value of a face whose signs alternate, until there is none: where two sheets pass
+/// through one face, one vertex a cell would tie them together in an edge of four triangles.
+fn separate_sheets(values: &mut [f64], [nx, ny, nz]: [usize; 3]) {
+    let strides = [1, nx * nz, nx];
+    for _ in 0..PASSES {
+        let mut alternating = 0;
+        for (u, v) in [(0, 1), (1, 2), (2, 0)] {
+            let ends = [nx, ny, nz].map(|n| n - 1);
+            for y in 0..ends[1] {
+                for z in 0..ends[2] {
+                    for x in 0..ends[0] {
+                        let first = (y * nz + z) * nx + x;
+                        let face =
+                            [0, strides[u], strides[u] + strides[v], strides[v]].map(|step| first + step);
+                        let inside = face.map(|i| values[i] < 0.0);
+                        if inside[0] == inside[2] && inside[1] == inside[3] && inside[0] != inside[1] {
+                            let smallest =
+                                face.into_iter().min_by(|&i, &j| values[i].abs().total_cmp(&values[j].abs()));
+                            smallest.into_iter().for_each(|i| values[i] = -values[i]);
+                            alternating += 1;
+                        }
+                    }
+                }
+            }
+        }
+        if alternating == 0 {
+            break;
+        }
+    }
+}
+
+/// How often the lattice is searched for alternating signs at most.
+const PASSES: usize = 8;
+
 /// How often all vertices are spread evenly.
 const RELAXATIONS: usize = 6;
-/// How many folds are smoothed away at most, one after another.
+/// How many edges are collapsed at most, one after another.
 const UNFOLDINGS: usize = 200;
 
 impl Mesh {
-    /// Takes the `moving` vertices by `step` of the way to the mean of their neighbours and back to the surface: needles become
-    /// triangles.
-    fn relax(&mut self, field: &impl Field, moving: &[bool], step: f64) {
+    /// Takes each vertex halfway to the mean of its neighbours and back to the surface: needles become triangles.
+    fn relax(&mut self, field: &impl Field) {
         let mut means = vec![(DVec3::ZERO, 0.0); self.positions.len()];
         for [a, b, c] in &self.triangles {
             for (at, next) in [(a, b), (b, c), (c, a)] {
@@ -112,27 +142,18 @@ impl Mesh {
                 mean.1 += 1.0;
             }
         }
-        for (i, (sum, count)) in means.into_iter().enumerate().filter(|&(i, _)| moving[i]) {
-            self.positions[i] = field.project(self.positions[i].lerp(sum / count, step));
+        for (i, (sum, count)) in means.into_iter().enumerate() {
+            self.positions[i] = field.project(self.positions[i].lerp(sum / count, 0.5));
             self.normals[i] = field.normal(self.positions[i]);
         }
     }
 
-    /// Whether a triangle leans more than 75° away from its normals.
+    /// Whether a triangle leans more than 85° away from its normals.
     fn is_folded(&self, triangle: [u32; 3]) -> bool {
         let [a, b, c] = self.corners(triangle);
         let normal: DVec3 = triangle.iter().map(|&i| self.normals[i as usize]).sum();
         let across = (b - a).cross(c - a);
-        across.dot(normal) < 0.25 * across.length() * normal.length()
-    }
-
-    /// The corners of folded triangles.
-    fn folded(&self) -> Vec<bool> {
-        let mut folded = vec![false; self.positions.len()];
-        for triangle in self.triangles.iter().filter(|&&t| self.is_folded(t)).flatten() {
-            folded[*triangle as usize] = true;
-        }
-        folded
+        across.dot(normal) < 0.087 * across.length() * normal.length()
     }
 
     /// Makes one vertex of the shortest edge of a triangle that may go: one whose ends have two neighbours in common, so that

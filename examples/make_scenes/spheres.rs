@@ -18,7 +18,7 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
     glb.mesh("floor", &rectangle(DVec3::new(-4.0, 0.0, 3.0), DVec3::X * 8.0, -DVec3::Z * 6.0), floor);
 
     // A red and yellow chessboard, and a disk that is cut out of white.
-    let chess = |x: u32, y: u32| if (x + y) % 2 == 0 { [200, 30, 30] } else { [230, 200, 60] };
+    let chess = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [200, 30, 30] } else { [230, 200, 60] };
     let dots = |x: u32, y: u32| {
         let (dx, dy) = (2 * (x % 4) as i32 - 3, 2 * (y % 4) as i32 - 3);
         [240, 240, 240, if dx * dx + dy * dy <= 2 { 0 } else { 255 }]
