@@ -91,7 +91,9 @@ fn every_module_uses_only_floors_below_its_own() {
             }
             match floors.get(used.as_str()) {
                 Some(&below) if below < floor => {}
-                Some(&other) => wrong.push(format!("{}: floor {floor} uses {used} of floor {other}", path.display())),
+                Some(&other) => {
+                    wrong.push(format!("{}: floor {floor} uses {used} of floor {other}", path.display()))
+                }
                 None => wrong.push(format!("{}: crate::{used} is not a module with a floor", path.display())),
             }
         }

@@ -65,7 +65,7 @@ struct Node {
 
 /// Pending nodes that traversal keeps without allocating. Only pathological trees, such as thousands of coincident triangles
 /// make, are deeper.
-const STACK: usize = 96;
+const STACK: usize = 48;
 
 /// What is left to visit: node or first triangle, triangle count, and where the ray enters.
 struct Pending {

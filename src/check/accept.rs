@@ -75,7 +75,8 @@ pub fn accept(sweep: &Sweep, names: &[String]) -> Result<Vec<Accepted>, AcceptEr
             return Err(AcceptError::NoResult { name: job.name.clone(), path });
         }
         let reference = reference_of(&imagefile::read(&path)?);
-        let finite = reference.layers.iter().flat_map(|l| &l.channels).flat_map(|c| &c.values).all(|v| v.is_finite());
+        let finite =
+            reference.layers.iter().flat_map(|l| &l.channels).flat_map(|c| &c.values).all(|v| v.is_finite());
         if !finite {
             return Err(AcceptError::NotFinite { name: job.name.clone() });
         }

@@ -7,7 +7,9 @@ use super::{Outcome, WELL, print};
 
 /// Print the completions of a shell.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  pipeline completions bash > ~/.local/share/bash-completion/completions/pipeline")]
+#[command(
+    after_help = "Example:\n  pipeline completions bash > ~/.local/share/bash-completion/completions/pipeline"
+)]
 pub(super) struct Arguments {
     /// The shell.
     shell: Shell,

@@ -112,7 +112,13 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     match arguments.mode {
         Mode::Idiff => {
             let names = [&arguments.a, &arguments.b].map(|p| p.display().to_string());
-            let report = compare::idiff::idiff([&names[0], &names[1]], &a, &b, &thresholds(arguments), options(arguments))?;
+            let report = compare::idiff::idiff(
+                [&names[0], &names[1]],
+                &a,
+                &b,
+                &thresholds(arguments),
+                options(arguments),
+            )?;
             print(&report.stdout)?;
             if !report.stderr.is_empty() {
                 tell(&report.stderr);
@@ -181,7 +187,12 @@ fn cross_check(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> 
     Ok(())
 }
 
-fn write_difference(path: &Path, a: &Raster, b: &Raster, scale: f32) -> Result<(), Box<dyn std::error::Error>> {
+fn write_difference(
+    path: &Path,
+    a: &Raster,
+    b: &Raster,
+    scale: f32,
+) -> Result<(), Box<dyn std::error::Error>> {
     let difference = compare::diff_image(a, b, scale)?;
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         let layer = difference.picture();
@@ -199,7 +210,17 @@ fn told(comparison: &Comparison) -> String {
     let mut table = Table::new();
     let rule = LineStyle::none().fill('─').junction('─');
     table.load_style(presets::NOTHING.header_separator(rule));
-    table.set_header(["part", "channels", "max error", "mean error", "RMS error", "bias", "pixels over", "not finite", "worst at"]);
+    table.set_header([
+        "part",
+        "channels",
+        "max error",
+        "mean error",
+        "RMS error",
+        "bias",
+        "pixels over",
+        "not finite",
+        "worst at",
+    ]);
     for g in &comparison.groups {
         let s = &g.statistics;
         let over = if g.limits.is_some() { s.over.to_string() } else { format!("({})", s.over) };
@@ -225,6 +246,7 @@ fn told(comparison: &Comparison) -> String {
         Verdict::Differs { why, .. } | Verdict::Shape { why } => format!(": {why}"),
         _ => String::new(),
     };
-    let table = if comparison.groups.is_empty() { String::new() } else { format!("{}\n\n", table.trim_fmt()) };
+    let table =
+        if comparison.groups.is_empty() { String::new() } else { format!("{}\n\n", table.trim_fmt()) };
     format!("{table}{}{why}\n", verdict.word())
 }

@@ -53,9 +53,13 @@ impl Progress {
             while !stopped.load(Ordering::Relaxed) {
                 let (paths, total) =
                     (control.paths.load(Ordering::Relaxed), control.total_paths.load(Ordering::Relaxed));
-                if total > 0 {
-                    bar.set_position(done * STEPS + paths.min(total) * STEPS / total);
-                    bar.set_message(format!("{:.1} of {:.1} M samples", paths as f64 * 1e-6, total as f64 * 1e-6));
+                if let Some(steps) = (paths.min(total) * STEPS).checked_div(total) {
+                    bar.set_position(done * STEPS + steps);
+                    bar.set_message(format!(
+                        "{:.1} of {:.1} M samples",
+                        paths as f64 * 1e-6,
+                        total as f64 * 1e-6
+                    ));
                 }
                 std::thread::park_timeout(INTERVAL);
             }

@@ -10,7 +10,7 @@ use crate::convert::ConvertOptions;
 use crate::disney::DiffuseModel;
 use crate::imagefile;
 use crate::import::{ImportOptions, LightUnits};
-use crate::job::{self, Build, LoadedScene, PlannedJob};
+use crate::job::{self, Build, JobError, LoadedScene, PlannedJob};
 use crate::output::{Provenance, stamp, tone};
 use crate::raster::Raster;
 use crate::record::{Job, Override, Value};
@@ -84,7 +84,8 @@ fn parse_enum<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
 }
 
 fn parse_pixel(text: &str) -> Result<(u32, u32), String> {
-    let pixel = text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    let pixel =
+        text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
     pixel.ok_or_else(|| format!("{text:?} is not a pixel; two whole numbers are expected, such as 320,240"))
 }
 
@@ -93,7 +94,10 @@ fn parse_override(text: &str) -> Result<Override, String> {
     let (path, value) = text.split_once('=').ok_or_else(|| format!("{text:?} is not PATH=VALUE"))?;
     let document = format!("v = {}", value.trim());
     let value = match document.parse::<toml::Table>() {
-        Ok(mut table) => table.remove("v").and_then(from_toml).ok_or_else(|| format!("{text:?}: a table or a date is no value"))?,
+        Ok(mut table) => table
+            .remove("v")
+            .and_then(from_toml)
+            .ok_or_else(|| format!("{text:?}: a table or a date is no value"))?,
         Err(_) => Value::Text(value.trim().to_owned()),
     };
     Ok(Override { path: path.trim().to_owned(), value })
@@ -116,13 +120,15 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let import_options = ImportOptions {
         light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
     };
-    let loaded = job::load(&arguments.scene, &import_options, &ConvertOptions { diffuse: arguments.diffuse })?;
+    let loaded =
+        job::load(&arguments.scene, &import_options, &ConvertOptions { diffuse: arguments.diffuse })?;
     let build = Build::current()?;
-    let planned = job::plan(&described(arguments), &loaded, &build)?;
+    let planned = job::plan(&described(arguments), &loaded, &build).map_err(with_hint)?;
     for warning in loaded.warnings.iter().chain(&planned.warnings) {
         talk.say(&format!("warning: {warning}"));
     }
-    let prepared = Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
+    let prepared =
+        Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
     if let (Some((x, y)), Some(sample)) = (arguments.pixel, arguments.sample) {
         return tell_path(&prepared, &planned, x, y, sample);
     }
@@ -142,6 +148,14 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         write(output, format, &rendered, &Display { tone: arguments.tone, exposure: arguments.exposure })?;
     }
     Ok(WELL)
+}
+
+/// The error with what may help below it.
+fn with_hint(error: JobError) -> Box<dyn std::error::Error> {
+    match error.hint() {
+        Some(hint) => format!("{error}\nhint: {hint}").into(),
+        None => error.into(),
+    }
 }
 
 /// The job that the arguments describe.
@@ -224,7 +238,12 @@ fn write(path: &Path, format: Format, raster: &Raster, display: &Display) -> Out
     let layer = raster.picture();
     match (format, layer.rgb()) {
         (Format::Png, Some(rgb)) => {
-            imagefile::write_png(path, layer.window.width, layer.window.height, &tone::to_srgb8(rgb, display))?;
+            imagefile::write_png(
+                path,
+                layer.window.width,
+                layer.window.height,
+                &tone::to_srgb8(rgb, display),
+            )?;
         }
         _ => {
             imagefile::write_exr(path, raster)?;
@@ -247,7 +266,8 @@ fn tell_path(prepared: &Prepared, planned: &PlannedJob, x: u32, y: u32, sample: 
     for (i, v) in path.vertices.iter().enumerate() {
         let [px, py, pz] = v.point;
         let (beta, radiance) = (v.beta.to_array(), v.radiance.to_array());
-        text += &format!("{:>3}  at ({px}, {py}, {pz})  beta {beta:?}  radiance so far {radiance:?}\n", i + 1);
+        text +=
+            &format!("{:>3}  at ({px}, {py}, {pz})  beta {beta:?}  radiance so far {radiance:?}\n", i + 1);
     }
     print(&format!("{text}radiance {:?}\n", path.radiance.to_array()))?;
     Ok(WELL)

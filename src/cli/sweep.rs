@@ -47,7 +47,8 @@ pub(super) struct Arguments {
 fn parse_shard(text: &str) -> Result<Shard, String> {
     let wrong = || format!("{text:?} is not I/N with 1 ≤ I ≤ N, such as 1/4");
     let (index, count) = text.split_once('/').ok_or_else(wrong)?;
-    let shard = Shard { index: index.parse().map_err(|_| wrong())?, count: count.parse().map_err(|_| wrong())? };
+    let shard =
+        Shard { index: index.parse().map_err(|_| wrong())?, count: count.parse().map_err(|_| wrong())? };
     if (1..=shard.count).contains(&shard.index) { Ok(shard) } else { Err(wrong()) }
 }
 
@@ -98,7 +99,9 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
 /// An error beats a difference.
 fn exit_code(record: &JobRecord) -> u8 {
     match (&record.outcome, &record.verdict) {
-        (JobOutcome::Failed { .. }, _) | (_, Verdict::Error { .. } | Verdict::MissingReference { .. }) => FAILED,
+        (JobOutcome::Failed { .. }, _) | (_, Verdict::Error { .. } | Verdict::MissingReference { .. }) => {
+            FAILED
+        }
         (JobOutcome::Done, verdict) if verdict.passes() => WELL,
         (JobOutcome::Done, _) => DIFFERENT,
     }
@@ -112,7 +115,10 @@ fn described(sweep: &Sweep) -> String {
         for o in &job.overrides {
             text += &format!("  {} = {}\n", o.path, o.value);
         }
-        text += &format!("  samples = {}, seed = {}, max_depth = {}\n", settings.spp, settings.seed, settings.max_depth);
+        text += &format!(
+            "  samples = {}, seed = {}, max_depth = {}\n",
+            settings.spp, settings.seed, settings.max_depth
+        );
     }
     text + &format!("{} jobs into {}\n", sweep.jobs.len(), sweep.folder.display())
 }

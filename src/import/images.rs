@@ -36,9 +36,8 @@ pub(super) fn decode_image(bytes: &[u8], name: &str) -> Result<(Image, Option<Wa
         Samples::U16(values) => Pixels::U16(values),
         Samples::F32(values) => Pixels::F32(values),
     };
-    let warning = (replaced > 0).then(|| {
-        Warning::new(name, format!("{replaced} values were negative or not finite and are 0 now"))
-    });
+    let warning = (replaced > 0)
+        .then(|| Warning::new(name, format!("{replaced} values were negative or not finite and are 0 now")));
     Ok((Image { name: name.to_owned(), width, height, channels, pixels }, warning))
 }
 

@@ -19,8 +19,8 @@ pub use aris::ArisError;
 pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
 pub use images::{EnvironmentError, read_environment};
-pub use validate::InvalidScene;
 pub use obj::ObjError;
+pub use validate::InvalidScene;
 
 use crate::record::Warning;
 use crate::scene::Scene;

@@ -28,9 +28,14 @@ impl Build {
     /// If the executable can't be read.
     pub fn current() -> Result<Self, JobError> {
         let failed = |path: &Path, cause| JobError::File { path: path.to_owned(), cause };
-        let path = std::env::current_exe().map_err(|cause| failed(Path::new("the running executable"), cause))?;
+        let path =
+            std::env::current_exe().map_err(|cause| failed(Path::new("the running executable"), cause))?;
         let bytes = std::fs::read(&path).map_err(|cause| failed(&path, cause))?;
-        Ok(Self { executable: blake3::hash(&bytes), version: env!("CARGO_PKG_VERSION"), feature_level: feature_level() })
+        Ok(Self {
+            executable: blake3::hash(&bytes),
+            version: env!("CARGO_PKG_VERSION"),
+            feature_level: feature_level(),
+        })
     }
 }
 
@@ -88,7 +93,10 @@ mod tests {
         Job {
             name: "a".into(),
             scene: "s.glb".into(),
-            overrides: vec![Override { path: "material.m.roughness".into(), value: Value::Number(roughness) }],
+            overrides: vec![Override {
+                path: "material.m.roughness".into(),
+                value: Value::Number(roughness),
+            }],
             settings: RenderSettings::default(),
             coordinates: Vec::new(),
         }

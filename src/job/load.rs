@@ -29,7 +29,11 @@ pub struct LoadedScene {
 ///
 /// # Errors
 /// If the scene can't be read, or has nothing to render.
-pub fn load(path: &Path, import_options: &ImportOptions, convert_options: &ConvertOptions) -> Result<LoadedScene, JobError> {
+pub fn load(
+    path: &Path,
+    import_options: &ImportOptions,
+    convert_options: &ConvertOptions,
+) -> Result<LoadedScene, JobError> {
     let imported = import(path, import_options)?;
     let converted = to_disney(imported.scene, convert_options);
     let mut scene = converted.scene;
@@ -46,5 +50,11 @@ pub fn load(path: &Path, import_options: &ImportOptions, convert_options: &Conve
         warnings.push(Warning::new(&place, "no light: a studio environment is added"));
     }
     let geometry = Arc::new(Geometry::build(&scene)?);
-    Ok(LoadedScene { scene: Arc::new(scene), geometry, files: imported.files, notes: converted.notes, warnings })
+    Ok(LoadedScene {
+        scene: Arc::new(scene),
+        geometry,
+        files: imported.files,
+        notes: converted.notes,
+        warnings,
+    })
 }

@@ -12,7 +12,8 @@ use std::path::PathBuf;
 pub use identity::Build;
 pub use load::{LoadedScene, load};
 pub use run::{
-    Destination, PlannedJob, References, failed_record, finished, image_path, plan, recheck, record_path, reference_of, run,
+    Destination, PlannedJob, References, failed_record, finished, image_path, plan, recheck, record_path,
+    reference_of, run,
 };
 
 /// Why a job can't be done.
@@ -49,4 +50,14 @@ pub enum JobError {
         /// What is wrong with it.
         cause: serde_json::Error,
     },
+}
+
+impl JobError {
+    /// What may help, where there is something to say.
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Edit(error) => error.hint(),
+            _ => None,
+        }
+    }
 }

@@ -140,7 +140,8 @@ fn attempt(
     record: &mut JobRecord,
 ) -> Result<(), JobError> {
     let start = Instant::now();
-    let prepared = Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
+    let prepared =
+        Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
     record.size = [prepared.size().0, prepared.size().1];
     record.skipped = prepared.skipped();
     record.timings.prepare = start.elapsed().as_secs_f64();
@@ -173,7 +174,8 @@ fn attempt(
     record.outputs.insert(format!("{}.exr", planned.job.name), digest);
     record.outcome = Outcome::Done;
     if let Some(references) = &destination.references {
-        (record.verdict, record.cross_check) = compare_with_reference(&path, &raster, &planned.job.name, references);
+        (record.verdict, record.cross_check) =
+            compare_with_reference(&path, &raster, &planned.job.name, references);
     }
     record.timings.output = start.elapsed().as_secs_f64();
     Ok(())
@@ -231,7 +233,8 @@ fn restricted_to(result: &Raster, reference: &Raster) -> Raster {
         .iter()
         .filter_map(|wanted| {
             let layer = result.layer(&wanted.name)?;
-            let channels = layer.channels.iter().filter(|c| wanted.channel(&c.name).is_some()).cloned().collect();
+            let channels =
+                layer.channels.iter().filter(|c| wanted.channel(&c.name).is_some()).cloned().collect();
             Some(Layer { channels, ..layer.clone() })
         })
         .collect();

@@ -135,12 +135,13 @@ impl Sampler {
     pub fn set(&self, vertex: u32, purpose: Purpose) -> [f32; 4] {
         let set = mix64(self.key ^ mix64((u64::from(vertex) << 8) | purpose as u64));
         let index = owen_scramble(self.index, set as u32);
-        let point = sobol4(index);
         let mut seed = set >> 32;
-        point.map(|x| {
+        let mut numbers = [0.0; 4];
+        for (number, x) in numbers.iter_mut().zip(sobol4(index)) {
             seed = mix64(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
-            unit_f32(owen_scramble(x, seed as u32))
-        })
+            *number = unit_f32(owen_scramble(x, seed as u32));
+        }
+        numbers
     }
 }
 

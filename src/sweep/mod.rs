@@ -27,15 +27,7 @@ pub struct SweepResult {
 /// Why a sweep can't be run, or its sheet not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// The manifest could not be read.
-    #[error("cannot read {}: {cause}", path.display())]
-    Read {
-        /// The manifest.
-        path: PathBuf,
-        /// The system's reason.
-        cause: std::io::Error,
-    },
-    /// The manifest is wrong, by itself or for its scene.
+    /// The manifest can't be read, or is wrong, by itself or for its scene.
     #[error(transparent)]
     Manifest(#[from] crate::manifest::ManifestErrors),
     /// A pattern for scenes is malformed.
@@ -45,12 +37,6 @@ pub enum SweepError {
         pattern: String,
         /// What is wrong with it.
         cause: glob::PatternError,
-    },
-    /// A pattern for scenes matches nothing.
-    #[error("scene = {pattern:?}: no file matches")]
-    NoMatch {
-        /// The pattern.
-        pattern: String,
     },
     /// The folder of results can't be used.
     #[error("cannot use the folder {}: {cause}", path.display())]

@@ -22,14 +22,12 @@ pub struct Sweep {
 /// # Errors
 /// If it can't be read, is wrong (all its errors at once), or its patterns match no scene.
 pub fn open(path: &Path) -> Result<Sweep, SweepError> {
-    let text =
-        std::fs::read_to_string(path).map_err(|cause| SweepError::Read { path: path.to_owned(), cause })?;
-    let manifest = Manifest::parse(&text, path)?;
+    let manifest = Manifest::read(path)?;
     let scenes = find_scenes(&manifest)?;
     let jobs = expand(&manifest, &scenes)?;
     let folder = match &manifest.output {
         Some(folder) => manifest.folder().join(folder),
-        None => Path::new("outputs").join(&manifest.name),
+        None => Path::new("outputs").join(manifest.folder_name()),
     };
     Ok(Sweep { manifest, jobs, folder })
 }
@@ -37,18 +35,17 @@ pub fn open(path: &Path) -> Result<Sweep, SweepError> {
 /// The scene files that the manifest names, those of a pattern in alphabetical order.
 fn find_scenes(manifest: &Manifest) -> Result<Vec<PathBuf>, SweepError> {
     let mut scenes = Vec::new();
-    for entry in manifest.scene_patterns() {
+    for (index, entry) in manifest.scene_patterns().into_iter().enumerate() {
         if let Some(path) = entry.path {
             scenes.push(path);
             continue;
         }
         let pattern = entry.pattern;
-        let found = glob::glob(&entry.glob)
-            .map_err(|cause| SweepError::Pattern { pattern: pattern.clone(), cause })?;
+        let found = glob::glob(&entry.glob).map_err(|cause| SweepError::Pattern { pattern, cause })?;
         // A folder that can't be looked into has no scenes for us.
         let mut matches: Vec<PathBuf> = found.filter_map(Result::ok).filter(|path| path.is_file()).collect();
         if matches.is_empty() {
-            return Err(SweepError::NoMatch { pattern });
+            return Err(manifest.no_scene(index).into());
         }
         matches.sort();
         scenes.extend(matches);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Sweep, SweepError};
 use crate::imagefile;
 use crate::job;
-use crate::raster::Layer;
+use crate::manifest::Located;
 use crate::record::JobRecord;
 use crate::report::{
     Cell, Entry, PageInput, PageJob, Picture, Plan, SheetFile, arrange, draw_linear, draw_png, html,
@@ -28,13 +28,12 @@ pub(super) fn present(
     folder: &Path,
 ) -> Result<Presentation, SweepError> {
     let spec = &sweep.manifest.sheet;
-    let pictures: Vec<Option<Layer>> = sweep.jobs.iter().map(|j| picture(&job::image_path(folder, &j.name))).collect();
     let mut entries = Vec::with_capacity(sweep.jobs.len());
-    for (job, layer) in sweep.jobs.iter().zip(&pictures) {
+    for job in &sweep.jobs {
         let record = records.iter().find(|r| r.job.name == job.name);
-        let shown = layer.as_ref().map(|l| Picture::of(l)).transpose()?;
-        let cell = match (record, shown) {
-            (Some(record), shown) => Cell::of(record, shown),
+        let picture = picture(&job::image_path(folder, &job.name), spec.cell_width)?;
+        let cell = match (record, picture) {
+            (Some(record), picture) => Cell::of(record, picture),
             (None, Some(picture)) => Cell::Picture { picture, mark: None },
             (None, None) => Cell::Missing,
         };
@@ -42,11 +41,15 @@ pub(super) fn present(
     }
     let title = spec.title.clone().unwrap_or_else(|| sweep.manifest.name.clone());
     let subtitle = subtitle(sweep);
+    // An axis may be called by its name or by one of its paths; jobs know it by one of them.
+    let axis = |named: &Option<Located<String>>| {
+        named.as_ref().map(|n| sweep.manifest.axis_id(&n.value).unwrap_or_else(|| n.value.clone()))
+    };
     let plan = Plan {
         title: title.clone(),
         subtitle: subtitle.clone(),
-        columns: spec.columns.as_ref().map(|c| c.value.clone()),
-        rows: spec.rows.as_ref().map(|r| r.value.clone()),
+        columns: axis(&spec.columns),
+        rows: axis(&spec.rows),
         cell_width: spec.cell_width,
     };
     let sheet = arrange(entries, &plan)?;
@@ -54,7 +57,8 @@ pub(super) fn present(
     let mut files = Vec::new();
     let mut sheets = Vec::new();
     for (index, page) in sheet.pages.iter().enumerate() {
-        let stem = if sheet.pages.len() == 1 { "sheet".to_owned() } else { format!("sheet-{:03}", index + 1) };
+        let stem =
+            if sheet.pages.len() == 1 { "sheet".to_owned() } else { format!("sheet-{:03}", index + 1) };
         let png = folder.join(format!("{stem}.png"));
         let (width, height, rgb) = draw_png(&sheet, index, &spec.display)?;
         imagefile::write_png(&png, width, height, &rgb)?;
@@ -79,12 +83,11 @@ pub(super) fn present(
     Ok(Presentation { sheets, page })
 }
 
-/// The picture of an image file, if there is one.
-fn picture(path: &Path) -> Option<Layer> {
-    let raster = imagefile::read(path).ok()?;
-    let mut layer = raster.layers.into_iter().next()?;
-    layer.channels.retain(|c| matches!(c.name.as_str(), "R" | "G" | "B"));
-    Some(layer)
+/// The picture of an image file, as wide as a cell, if there is one. Only that is kept in memory.
+fn picture(path: &Path, cell_width: Option<u32>) -> Result<Option<Picture<'static>>, SweepError> {
+    let Ok(raster) = imagefile::read(path) else { return Ok(None) };
+    let picture = Picture::of(raster.picture())?;
+    Ok(Some(picture.shrunk(cell_width.unwrap_or(u32::MAX)).into_owned()))
 }
 
 fn subtitle(sweep: &Sweep) -> String {
