@@ -36,7 +36,7 @@
 //! | 3 | [`import`], [`convert`], [`manifest`], [`accel`], [`light`] |
 //! | 2 | [`record`], [`scene`], [`imagefile`] |
 //! | 1 | [`disney`], [`raster`], [`settings`] |
-//! | 0 | [`math`], [`color`] |
+//! | 0 | [`math`], and above it [`color`] |
 
 pub mod accel;
 pub mod check;

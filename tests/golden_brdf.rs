@@ -2,8 +2,12 @@
 
 #![allow(clippy::print_stderr, reason = "a skipped test says so, and the errors found are worth reading")]
 
+#[path = "common/outside.rs"]
+mod outside;
+
 use std::path::Path;
 
+use outside::outside;
 use pipeline::color::Rgb;
 use pipeline::disney::{Bsdf, DiffuseModel, Masking, Params};
 use pipeline::math::V3;
@@ -78,10 +82,7 @@ fn relative_error(row: &Row, prefix: &str, masking: Masking, diffuse: DiffuseMod
 
 #[test]
 fn reference_rows_hold_to_a_relative_1e_4() {
-    let Some(folder) = std::env::var_os("PIPELINE_ORACLE") else {
-        eprintln!("skipped: PIPELINE_ORACLE names no folder with reference rows");
-        return;
-    };
+    let Some(folder) = outside("PIPELINE_ORACLE") else { return };
     let files =
         [("disney_brdf.csv", Masking::Matched, 4000), ("disney_brdf_2012_g.csv", Masking::Remapped, 1500)];
     for (name, masking, expected_rows) in files {

@@ -3,12 +3,16 @@
 //! The environment's `PIPELINE_OIIO_PYTHON` names a Python that has OpenImageIO, `PIPELINE_CORPUS` a folder whose `exr/` holds
 //! images; a test that lacks its own says so and passes.
 
-#![expect(clippy::print_stderr, reason = "says what is skipped or refused")]
+#![expect(clippy::print_stderr, reason = "says what is refused")]
+
+#[path = "common/outside.rs"]
+mod outside;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use outside::outside;
 use pipeline::imagefile::{self, ImageFileError};
 use pipeline::raster::{Attribute, Layer, Raster, SampleType, Window};
 
@@ -49,11 +53,7 @@ while True:
 "#;
 
 fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("PIPELINE_OIIO_PYTHON").map(PathBuf::from);
-    if python.is_none() {
-        eprintln!("skipped: PIPELINE_OIIO_PYTHON names no Python with OpenImageIO");
-    }
-    python
+    outside("PIPELINE_OIIO_PYTHON")
 }
 
 /// One part as OpenImageIO sees it.
@@ -204,10 +204,7 @@ fn open_image_io_reads_our_png() {
 
 /// The files of the corpus with an extension, at most `most` below four mebibytes, in order.
 fn corpus(extension: &str, most: usize) -> Vec<PathBuf> {
-    let Some(folder) = std::env::var_os("PIPELINE_CORPUS") else {
-        eprintln!("skipped: PIPELINE_CORPUS names no folder");
-        return Vec::new();
-    };
+    let Some(folder) = outside("PIPELINE_CORPUS") else { return };
     let mut files: Vec<PathBuf> = walkdir::WalkDir::new(folder)
         .sort_by_file_name()
         .into_iter()

@@ -30,10 +30,14 @@ pub enum ImageFileError {
         cause: std::io::Error,
     },
     /// Its first bytes are none that are known.
-    #[error("{name} is not an image that can be read: expected OpenEXR, PNG, JPEG or Radiance HDR")]
+    #[error(
+        "{name} is not an image that can be read: it is {what}; OpenEXR, PNG, JPEG and Radiance HDR are read"
+    )]
     UnknownFormat {
         /// The image.
         name: String,
+        /// What it seems to be.
+        what: &'static str,
     },
     /// It declares more than fits the limit.
     #[error(

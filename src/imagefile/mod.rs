@@ -59,7 +59,20 @@ impl Format {
             .iter()
             .find(|(magic, _)| bytes.starts_with(magic))
             .map(|&(_, format)| format)
-            .ok_or_else(|| ImageFileError::UnknownFormat { name: name.into() })
+            .ok_or_else(|| ImageFileError::UnknownFormat { name: name.into(), what: recognised(bytes) })
+    }
+}
+
+/// Formats that are known but not read, for a clearer message.
+fn recognised(bytes: &[u8]) -> &'static str {
+    match bytes {
+        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', ..] => "a KTX2 image",
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => "a WebP image",
+        [b'I', b'I', 42, 0, ..] | [b'M', b'M', 0, 42, ..] => "a TIFF image",
+        [b'D', b'D', b'S', b' ', ..] => "a DDS image",
+        [b'G', b'I', b'F', b'8', ..] => "a GIF image",
+        [b'B', b'M', ..] => "a BMP image",
+        _ => "of an unknown format",
     }
 }
 
@@ -106,7 +119,7 @@ mod tests {
     fn a_file_is_known_by_its_first_bytes() {
         assert_eq!(Format::of(b"#?RGBE\n", "x").unwrap(), Format::Hdr);
         assert!(
-            matches!(decode(b"", "empty"), Err(ImageFileError::UnknownFormat { name }) if name == "empty")
+            matches!(decode(b"", "empty"), Err(ImageFileError::UnknownFormat { name, .. }) if name == "empty")
         );
         assert!(matches!(decode(b"GIF89a....", "x"), Err(ImageFileError::UnknownFormat { .. })));
     }

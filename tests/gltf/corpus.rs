@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::outside::outside;
+
 use pipeline::convert::{ConvertOptions, to_disney};
 use pipeline::import::{GltfError, ImportError, ImportOptions, import};
 
@@ -18,12 +20,8 @@ const REFUSED: [(&str, &str); 7] = [
 ];
 
 #[test]
-#[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn every_file_of_the_corpus_is_imported_or_refused_with_its_reason() {
-    let Some(corpus) = std::env::var_os("PIPELINE_CORPUS") else {
-        eprintln!("skipped: PIPELINE_CORPUS names no folder");
-        return;
-    };
+    let Some(corpus) = outside("PIPELINE_CORPUS") else { return };
     let mut files = Vec::new();
     collect(&Path::new(&corpus).join("gltf"), &mut files);
     assert!(files.len() > 30, "{} files", files.len());

@@ -3,6 +3,8 @@
 
 mod corpus;
 mod hostile;
+#[path = "../common/outside.rs"]
+mod outside;
 mod sample;
 
 use std::path::Path;
