@@ -2,7 +2,7 @@
 //! the same strings.
 //!
 //! The proportions are those that Nori's box made common: open in front, 2 wide, 1.6 high, 2 deep, two spheres on the floor,
-//! a light just below the ceiling.
+//! a light just below the ceiling, here with a rim.
 
 use std::fmt::Write;
 
@@ -69,7 +69,14 @@ fn parts() -> Result<Vec<Part>, MeshError> {
     walls.append(&rectangle(low, x, y));
     let right = rectangle(low + x, z, y);
     let left = rectangle(low, y, z);
-    let light = rectangle(DVec3::new(-0.24, h - 0.01, -0.22), DVec3::X * 0.48, DVec3::Z * 0.4);
+    let (corner, across, along) = (DVec3::new(-0.24, h - 0.01, -0.22), DVec3::X * 0.48, DVec3::Z * 0.4);
+    let light = rectangle(corner, across, along);
+    // MTL cannot say that a light shines to one side, as Aris' do: a rim up to the ceiling keeps what leaves its back.
+    let up = DVec3::Y * 0.01;
+    walls.append(&rectangle(corner, up, across));
+    walls.append(&rectangle(corner + along, across, up));
+    walls.append(&rectangle(corner, along, up));
+    walls.append(&rectangle(corner + across, up, along));
     let ball = |x: f64, z: f64| geodesic_sphere(DVec3::new(x, RADIUS + 0.005, z), RADIUS, 11);
     use super::mesh::Boundary::{Closed, Open};
     let part = |file, material, mesh: Mesh, boundary, smooth| {

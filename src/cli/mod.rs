@@ -15,6 +15,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::sweep::SweepError;
+
 /// Everything is well.
 const WELL: u8 = 0;
 /// Images differ.
@@ -70,7 +72,9 @@ pub fn main() -> ExitCode {
     match run(&arguments) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            tell(&format!("error: {error}"));
+            // Each of a manifest's errors has a heading of its own.
+            let is_headed = matches!(error.downcast_ref(), Some(SweepError::Manifest(_)));
+            tell(&if is_headed { error.to_string() } else { format!("error: {error}") });
             ExitCode::from(FAILED)
         }
     }

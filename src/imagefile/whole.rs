@@ -6,6 +6,11 @@ use std::path::Path;
 
 use super::ImageFileError;
 
+/// What temporary names begin with.
+const PREFIX: &str = ".writing-";
+/// What they end with.
+const SUFFIX: &str = ".tmp";
+
 /// Writes a file so that it appears whole or not at all: under a temporary name in the same folder, synced, then renamed.
 /// An existing file is replaced. Creates no folders.
 ///
@@ -24,17 +29,69 @@ fn place(path: &Path, bytes: &[u8]) -> io::Result<()> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    let mut file = temporary(folder)?;
+    let mut file = claimed(folder)?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|failed| failed.error)?;
     sync_folder(folder)
 }
 
+/// Removes the temporary files that killed runs left in `folder`, and tells how many. Those of writers that live are locked and
+/// stay; so do all where the system has no locks.
+///
+/// # Errors
+/// If the folder can't be read.
+pub fn remove_leftovers(folder: &Path) -> io::Result<usize> {
+    let mut removed = 0;
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let is_ours =
+            name.to_str().is_some_and(|n| n.starts_with(PREFIX) && n.ends_with(SUFFIX)) && is_file(&entry);
+        // Whatever fails here, the file's writer was quicker, or it is not ours to touch: it is no part of any result.
+        if is_ours
+            && let Ok(file) = File::options().write(true).open(entry.path())
+            && file.try_lock().is_ok()
+            && std::fs::remove_file(entry.path()).is_ok()
+        {
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
+fn is_file(entry: &std::fs::DirEntry) -> bool {
+    entry.file_type().is_ok_and(|kind| kind.is_file())
+}
+
+/// A temporary file, locked as long as it is written.
+fn claimed(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
+    loop {
+        let file = temporary(folder)?;
+        // Where the file system has no locks, nobody can tell a leftover, and nobody removes one.
+        if file.as_file().lock().is_err() || !is_removed(file.as_file())? {
+            return Ok(file);
+        }
+    }
+}
+
+/// Somebody took the file for a leftover between its creation and its lock.
+#[cfg(unix)]
+fn is_removed(file: &File) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    Ok(file.metadata()?.nlink() == 0)
+}
+
+/// Here an open file can't be removed.
+#[cfg(not(unix))]
+fn is_removed(_file: &File) -> io::Result<bool> {
+    Ok(false)
+}
+
 /// A hidden file that is removed when dropped, with the permissions that any new file would get.
 fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".writing-").suffix(".tmp");
+    builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -97,6 +154,21 @@ mod tests {
         assert!(write_whole(&path, b"x").is_err());
         assert_eq!(names(folder.path()), ["taken"]);
         assert!(write_whole(Path::new("/"), b"x").is_err());
+    }
+
+    #[test]
+    fn leftovers_are_removed_but_not_what_is_being_written_or_is_not_ours() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [".writing-abc.tmp", ".writing-abc", "writing.tmp"] {
+            std::fs::write(folder.path().join(name), b"half").unwrap();
+        }
+        std::fs::create_dir(folder.path().join(".writing-folder.tmp")).unwrap();
+        let alive = claimed(folder.path()).unwrap();
+        assert_eq!(remove_leftovers(folder.path()).unwrap(), 1);
+        assert!(alive.path().exists());
+        drop(alive);
+        assert_eq!(names(folder.path()), [".writing-abc", ".writing-folder.tmp", "writing.tmp"]);
+        assert!(remove_leftovers(&folder.path().join("none")).is_err());
     }
 
     #[cfg(unix)]

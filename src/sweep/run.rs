@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::{Sweep, SweepError, SweepResult, present};
 use crate::compare::{Limits, StrictLimits, Thresholds, find_idiff};
 use crate::convert::ConvertOptions;
+use crate::imagefile;
 use crate::import::ImportOptions;
 use crate::job::{self, Build, Destination, JobError, LoadedScene, References};
 use crate::manifest::{self, CompareSpec};
@@ -185,13 +186,15 @@ fn scene_paths(jobs: &[Job]) -> Vec<&Path> {
     paths
 }
 
-/// The folder of results and those that job names lead into.
+/// The folder of results and those that job names lead into, without what a killed run left half written.
 fn create_folders(sweep: &Sweep, folder: &Path) -> Result<(), SweepError> {
     let images = sweep.jobs.iter().map(|job| job::image_path(folder, &job.name));
     let parents: std::collections::BTreeSet<PathBuf> =
         images.filter_map(|path| path.parent().map(Path::to_owned)).collect();
     for path in parents.into_iter().chain([folder.to_owned()]) {
-        std::fs::create_dir_all(&path).map_err(|cause| SweepError::Folder { path, cause })?;
+        std::fs::create_dir_all(&path)
+            .and_then(|()| imagefile::remove_leftovers(&path))
+            .map_err(|cause| SweepError::Folder { path, cause })?;
     }
     Ok(())
 }

@@ -1,0 +1,19 @@
+//! The program as its users run it: arguments and files in, files, text and an exit code out.
+//!
+//! Scenes are small and manifests are written for each test; every test has a folder of its own.
+
+mod command_line;
+mod configs;
+mod determinism;
+mod diff;
+mod failures;
+mod manifests;
+mod references;
+mod render;
+mod resume;
+mod scenes;
+mod support;
+mod sweep;
+
+#[path = "../common/outside.rs"]
+mod outside;
