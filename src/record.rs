@@ -211,9 +211,7 @@ pub struct Counts {
 /// Wall-clock seconds of a job's steps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Timings {
-    /// Import and conversion; 0 where the sweep had them already.
-    pub import: f64,
-    /// Preparing: BVH, lights, materials.
+    /// Preparing materials, lights and camera. The scene and its tree are made once for many jobs and don't count.
     pub prepare: f64,
     /// Rendering.
     pub render: f64,
@@ -246,7 +244,7 @@ pub struct JobRecord {
     pub warnings: Vec<Warning>,
     /// Seconds.
     pub timings: Timings,
-    /// The machine's name and feature level.
+    /// The operating system, architecture and feature level.
     pub host: String,
     /// The how-manieth try this was, from 1.
     pub attempt: u32,

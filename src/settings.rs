@@ -63,7 +63,7 @@ impl Default for RenderSettings {
 }
 
 impl RenderSettings {
-    /// The smallest number of samples a render may have: one for each replicate, unless a single sample is asked for.
+    /// The replicates that a render has: no more than it has samples.
     pub fn effective_replicates(&self) -> u32 {
         self.replicates.min(self.spp)
     }

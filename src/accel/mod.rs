@@ -109,6 +109,12 @@ const ROBUST_FAR: f32 = 1.000_000_4;
 impl Bvh {
     /// The nearest hit.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_where(ray, |_| true)
+    }
+
+    /// The nearest of the hits that `counts`; it may be asked about hits that are not the nearest, in any order.
+    #[inline]
+    pub fn closest_where(&self, ray: &Ray, mut counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
         let mut ray = *ray;
         let sheared = ShearedRay::new(&ray);
@@ -117,8 +123,11 @@ impl Bvh {
                 if let Some((t, barycentric)) = self.triangles[i].intersect(&sheared, ray.t_max)
                     && ray.source != Some(self.ids[i])
                 {
-                    ray.t_max = t;
-                    nearest = Some(Hit { t, triangle: self.ids[i], barycentric });
+                    let hit = Hit { t, triangle: self.ids[i], barycentric };
+                    if counts(&hit) {
+                        ray.t_max = t;
+                        nearest = Some(hit);
+                    }
                 }
             }
             ControlFlow::Continue(())

@@ -1,10 +1,11 @@
 //! Accepting results as references: an explicit act that tells how far each one moves.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::imagefile::{self, ImageFileError};
-use crate::job::{image_path, reference_of};
+use crate::job::{image_path, recorded, reference_of};
 use crate::raster::{Layer, Raster};
+use crate::record::Job;
 use crate::sweep::Sweep;
 
 /// A result that is now a reference.
@@ -31,8 +32,8 @@ pub enum AcceptError {
         /// The name.
         name: String,
     },
-    /// The job has no result yet.
-    #[error("{name}: there is no result {}; run the sweep first", path.display())]
+    /// The job has no result yet, or what lies there is the result of other parameters, or its last run failed.
+    #[error("{name}: {} is not a finished result of this job as the manifest has it now; run the sweep first", path.display())]
     NoResult {
         /// The job.
         name: String,
@@ -68,24 +69,29 @@ pub fn accept(sweep: &Sweep, names: &[String]) -> Result<Vec<Accepted>, AcceptEr
     if let Some(name) = names.iter().find(|n| !sweep.jobs.iter().any(|j| j.name == **n)) {
         return Err(AcceptError::UnknownJob { name: name.clone() });
     }
-    let mut results = Vec::new();
-    for job in sweep.jobs.iter().filter(|j| names.is_empty() || names.contains(&j.name)) {
-        let path = image_path(&sweep.folder, &job.name);
-        if !path.is_file() {
-            return Err(AcceptError::NoResult { name: job.name.clone(), path });
-        }
-        let reference = reference_of(&imagefile::read(&path)?);
-        let finite =
-            reference.layers.iter().flat_map(|l| &l.channels).flat_map(|c| &c.values).all(|v| v.is_finite());
-        if !finite {
-            return Err(AcceptError::NotFinite { name: job.name.clone() });
-        }
-        results.push((job.name.clone(), reference));
+    let jobs: Vec<&Job> = sweep.jobs.iter().filter(|j| names.is_empty() || names.contains(&j.name)).collect();
+    for job in &jobs {
+        reference(job, &sweep.folder)?;
     }
-    results.into_iter().map(|(name, reference)| write(&folder, name, &reference)).collect()
+    jobs.into_iter().map(|job| write(&folder, job.name.clone(), &reference(job, &sweep.folder)?)).collect()
 }
 
-fn write(folder: &std::path::Path, name: String, reference: &Raster) -> Result<Accepted, AcceptError> {
+/// The reference that a job's result would be.
+fn reference(job: &Job, results: &Path) -> Result<Raster, AcceptError> {
+    let path = image_path(results, &job.name);
+    if recorded(job, results).is_none() {
+        return Err(AcceptError::NoResult { name: job.name.clone(), path });
+    }
+    let reference = reference_of(&imagefile::read(&path)?);
+    let mut values = reference.layers.iter().flat_map(|l| &l.channels).flat_map(|c| &c.values);
+    if values.all(|v| v.is_finite()) {
+        Ok(reference)
+    } else {
+        Err(AcceptError::NotFinite { name: job.name.clone() })
+    }
+}
+
+fn write(folder: &Path, name: String, reference: &Raster) -> Result<Accepted, AcceptError> {
     let path = image_path(folder, &name);
     let parent = path.parent().unwrap_or(folder).to_owned();
     std::fs::create_dir_all(&parent).map_err(|cause| AcceptError::Folder { path: parent, cause })?;

@@ -117,6 +117,7 @@ fn from_toml(value: toml::Value) -> Option<Value> {
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     // Before minutes are spent on an image that can't be kept.
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
+    arguments.output.as_deref().map(check_folder).transpose()?;
     let import_options = ImportOptions {
         light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
     };
@@ -214,6 +215,14 @@ fn render_with_progress(
         ));
     }
     Ok(rendered.raster)
+}
+
+/// Whether a file can be made where `path` is to be.
+fn check_folder(path: &Path) -> Result<(), String> {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::tempfile_in(parent).map(drop).map_err(|cause| {
+        format!("{}: no file can be written in {}: {cause}", path.display(), parent.display())
+    })
 }
 
 /// What an image is written as.

@@ -34,6 +34,7 @@ pub(super) fn convert(
         frame: ShadingFrame::Surface,
         sides: Sides::Both,
         vertex_color: source.vertex_color,
+        vertex_alpha: source.vertex_color && source.alpha_mode != AlphaMode::Opaque,
         ..Material::default()
     };
     note_unread(source, &mut notes);

@@ -5,13 +5,15 @@ mod gltf;
 mod mtl;
 mod tint;
 
+use serde::Serialize;
+
 use crate::disney::{DiffuseModel, Model};
 use crate::record::Warning;
 use crate::scene::source::SourceMaterial;
 use crate::scene::{Material, Named, Scene};
 
 /// What a conversion leaves to its caller.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ConvertOptions {
     /// The diffuse term of all Disney materials; each dialect has its own where absent ([`DiffuseModel::Burley`] for glTF).
     pub diffuse: Option<DiffuseModel>,

@@ -15,6 +15,8 @@ use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 pub use aris::ArisError;
 pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
@@ -41,14 +43,15 @@ pub struct Imported {
 }
 
 /// What an import leaves to its caller.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ImportOptions {
     /// The unit that the intensities of glTF's punctual lights are read in.
     pub light_units: LightUnits,
 }
 
 /// The unit of glTF's punctual lights.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum LightUnits {
     /// Candela and lux as they are, beside emission in nits: all keep their ratio.
     #[default]
@@ -61,7 +64,7 @@ pub enum LightUnits {
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The file's name has an ending that no importer reads.
-    #[error("{}: no importer for this kind of file; known are .gltf, .glb, .obj, .yaml and .yml, each also with .gz", path.display())]
+    #[error("{}: no importer for this kind of file; known are .gltf, .glb and .obj, each also with .gz, and .yaml and .yml", path.display())]
     UnknownExtension {
         /// The file.
         path: PathBuf,
@@ -187,11 +190,11 @@ impl Dialect {
     /// The kind of the file called `name`, by its ending.
     fn of(name: &str) -> Option<Self> {
         let name = name.to_ascii_lowercase();
-        let name = name.strip_suffix(".gz").unwrap_or(&name);
-        match name.rsplit_once('.')?.1 {
+        let unpacked = name.strip_suffix(".gz").unwrap_or(&name);
+        match unpacked.rsplit_once('.')?.1 {
             "gltf" | "glb" => Some(Self::Gltf),
             "obj" => Some(Self::Obj),
-            "yaml" | "yml" => Some(Self::Aris),
+            "yaml" | "yml" if unpacked == name => Some(Self::Aris),
             _ => None,
         }
     }
@@ -224,6 +227,7 @@ mod tests {
             ("a.b.obj.gz", Some(Dialect::Obj)),
             ("cbox.yml", Some(Dialect::Aris)),
             ("a.gz", None),
+            ("cbox.yaml.gz", None),
             ("glb", None),
             ("a.fbx", None),
         ] {

@@ -6,8 +6,9 @@ use blake3::{Hash, Hasher};
 use serde::Serialize;
 
 use super::JobError;
-use crate::import::FileDigest;
-use crate::record::{Job, Override};
+use crate::convert::ConvertOptions;
+use crate::import::{FileDigest, ImportOptions};
+use crate::record::{Job, Override, Value};
 use crate::settings::RenderSettings;
 
 /// The program that renders: the part of identity that all jobs of a run share.
@@ -58,7 +59,9 @@ struct Content<'a> {
     format: u32,
     feature_level: &'a str,
     files: Vec<(&'a str, String)>,
-    overrides: &'a [Override],
+    import: &'a ImportOptions,
+    convert: &'a ConvertOptions,
+    overrides: Vec<Override>,
     settings: &'a RenderSettings,
 }
 
@@ -66,6 +69,7 @@ struct Content<'a> {
 pub(super) fn identify(
     job: &Job,
     files: &[&FileDigest],
+    options: (&ImportOptions, &ConvertOptions),
     settings: &RenderSettings,
     build: &Build,
 ) -> (String, String) {
@@ -73,7 +77,9 @@ pub(super) fn identify(
         format: 1,
         feature_level: build.feature_level,
         files: files.iter().map(|f| (f.name.as_str(), f.digest.to_hex().to_string())).collect(),
-        overrides: &job.overrides,
+        import: options.0,
+        convert: options.1,
+        overrides: job.overrides.iter().map(without_path).collect(),
         settings,
     };
     let text = serde_json::to_vec(&content).expect("plain data has a JSON form");
@@ -84,10 +90,19 @@ pub(super) fn identify(
     (identity.finalize().to_hex().to_string(), key.to_hex().to_string())
 }
 
+/// An override that names a file, without the name: how a path is written says nothing about the image, and its content is among
+/// the files.
+fn without_path(given: &Override) -> Override {
+    if given.path == "environment.image" {
+        Override { path: given.path.clone(), value: Value::Text(String::new()) }
+    } else {
+        given.clone()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Value;
 
     fn job(roughness: f64) -> Job {
         Job {
@@ -107,7 +122,13 @@ mod tests {
         let build = |tag: &[u8]| Build { executable: blake3::hash(tag), version: "0", feature_level: "x" };
         let file = |content: &[u8]| FileDigest { name: "s.glb".into(), digest: blake3::hash(content) };
         let id = |job: &Job, content: &[u8], tag: &[u8]| {
-            identify(job, &[&file(content)], &job.settings, &build(tag))
+            identify(
+                job,
+                &[&file(content)],
+                (&ImportOptions::default(), &ConvertOptions::default()),
+                &job.settings,
+                &build(tag),
+            )
         };
         let (identity, key) = id(&job(0.5), b"scene", b"one");
         let mut renamed = job(0.5);

@@ -17,6 +17,10 @@ pub struct LoadedScene {
     pub scene: Arc<Scene>,
     /// The tree.
     pub geometry: Arc<Geometry>,
+    /// How it was imported and converted.
+    pub import_options: ImportOptions,
+    /// As above.
+    pub convert_options: ConvertOptions,
     /// Every file that was read.
     pub files: Vec<FileDigest>,
     /// What conversion has to say on each material.
@@ -43,16 +47,24 @@ pub fn load(
     if scene.cameras.is_empty() {
         let camera = framing::frame(&scene);
         scene.cameras.push(Named::new("default", camera));
-        warnings.push(Warning::new(&place, "no camera: the whole scene is framed from three quarters"));
+        warnings.push(Warning::new(
+            &place,
+            "no camera: the whole scene is framed from three quarters, unless camera.* is set",
+        ));
     }
     if !studio::is_lit(&scene) {
         studio::add_studio_lighting(&mut scene);
-        warnings.push(Warning::new(&place, "no light: a studio environment is added"));
+        warnings.push(Warning::new(
+            &place,
+            "no light: a studio environment is added, unless environment.* is set",
+        ));
     }
     let geometry = Arc::new(Geometry::build(&scene)?);
     Ok(LoadedScene {
         scene: Arc::new(scene),
         geometry,
+        import_options: import_options.clone(),
+        convert_options: convert_options.clone(),
         files: imported.files,
         notes: converted.notes,
         warnings,

@@ -13,7 +13,7 @@ pub use identity::Build;
 pub use load::{LoadedScene, load};
 pub use run::{
     Destination, PlannedJob, References, failed_record, finished, image_path, plan, recheck, record_path,
-    reference_of, run,
+    recorded, reference_of, run,
 };
 
 /// Why a job can't be done.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -13,7 +14,7 @@ use crate::imagefile;
 use crate::import::{FileDigest, read_environment};
 use crate::manifest::edit;
 use crate::output::{Provenance, stamp};
-use crate::raster::{Layer, Raster};
+use crate::raster::{Attribute, Layer, Raster};
 use crate::record::{Counts, CrossCheck, Job, JobRecord, Outcome, Timings, Verdict, Warning};
 use crate::render::{Control, Prepared, Rendered, render};
 use crate::scene::Scene;
@@ -84,7 +85,8 @@ pub fn plan(job: &Job, loaded: &LoadedScene, build: &Build) -> Result<PlannedJob
         Ok(image)
     })?;
     let files: Vec<&FileDigest> = loaded.files.iter().chain(&images).collect();
-    let (identity, key) = identify(job, &files, &settings, build);
+    let (identity, key) =
+        identify(job, &files, (&loaded.import_options, &loaded.convert_options), &settings, build);
     Ok(PlannedJob { job: job.clone(), scene: Arc::new(scene), settings, identity, key, warnings })
 }
 
@@ -92,10 +94,15 @@ pub fn plan(job: &Job, loaded: &LoadedScene, build: &Build) -> Result<PlannedJob
 pub fn finished(planned: &PlannedJob, folder: &Path) -> Option<JobRecord> {
     let record = read_record(&record_path(folder, &planned.job.name)).ok()?;
     let same = record.identity == planned.identity && record.outcome == Outcome::Done;
-    let intact = record.outputs.iter().all(|(name, digest)| {
+    (same && is_intact(&record, folder)).then_some(record)
+}
+
+/// Every output of a record is what it was when the record was written.
+fn is_intact(record: &JobRecord, folder: &Path) -> bool {
+    let intact = |(name, digest): (&String, &String)| {
         fs::read(folder.join(name)).is_ok_and(|bytes| blake3::hash(&bytes).to_hex().as_str() == digest)
-    });
-    (same && intact && !record.outputs.is_empty()).then_some(record)
+    };
+    !record.outputs.is_empty() && record.outputs.iter().all(intact)
 }
 
 /// Renders a job, writes its image, compares it, and writes its record last. What fails is told in the record.
@@ -113,21 +120,39 @@ pub fn run(
     record.identity.clone_from(&planned.identity);
     record.key.clone_from(&planned.key);
     record.warnings = loaded.warnings.iter().chain(&planned.warnings).cloned().collect();
-    if let Err(error) = attempt(planned, loaded, build, destination, control, &mut record) {
-        record.outcome = Outcome::Failed { error: error.to_string() };
+    // A panic is a bug, but no reason to take the other jobs down.
+    let caught =
+        catch_unwind(AssertUnwindSafe(|| attempt(planned, loaded, build, destination, control, &mut record)));
+    match caught {
+        Ok(Ok(())) => {}
+        Ok(Err(error)) => record.outcome = Outcome::Failed { error: error.to_string() },
+        Err(_) => {
+            let error = "a bug in this program: the job panicked; the message is on stderr".to_owned();
+            record.outcome = Outcome::Failed { error };
+        }
     }
     write_record(&record, &destination.folder)?;
     Ok(record)
 }
 
-/// The record of a job that could not even be planned, written to its place.
+/// The record of finished work on this very job, whatever the state of its scene and of the program: its image is intact.
+pub fn recorded(job: &Job, folder: &Path) -> Option<JobRecord> {
+    let record = read_record(&record_path(folder, &job.name)).ok()?;
+    let same = record.job.overrides == job.overrides && record.job.settings == job.settings;
+    (same && record.outcome == Outcome::Done && is_intact(&record, folder)).then_some(record)
+}
+
+/// The record of a job that could not even be planned, written to its place; but the record of finished work stays: the scene may
+/// come back.
 ///
 /// # Errors
 /// If the record can't be written.
 pub fn failed_record(job: &Job, build: &Build, folder: &Path, error: &str) -> Result<JobRecord, JobError> {
     let mut record = blank_record(job, build, folder);
     record.outcome = Outcome::Failed { error: error.to_owned() };
-    write_record(&record, folder)?;
+    if recorded(job, folder).is_none() {
+        write_record(&record, folder)?;
+    }
     Ok(record)
 }
 
@@ -217,13 +242,25 @@ fn compare_with_reference(
     let outcome = || -> Result<(Verdict, CrossCheck), JobError> {
         let reference = imagefile::read(&reference_path)?;
         let comparable = restricted_to(result, &reference);
-        let verdict = strict::compare(&comparable, &reference, &references.limits)?.verdict();
+        let mut verdict = strict::compare(&comparable, &reference, &references.limits)?.verdict();
+        if let Verdict::Differs { why, .. } | Verdict::Shape { why } = &mut verdict
+            && key_of(result) != key_of(&reference)
+        {
+            why.push_str(
+                "; the reference is of another job: scene, parameters or settings have changed since",
+            );
+        }
         let program = references.idiff.as_deref();
         let check =
             compare::cross_check(program, path, &reference_path, &references.thresholds, Options::default())?;
         Ok((verdict, check))
     };
     outcome().unwrap_or_else(|error| (Verdict::Error { why: error.to_string() }, CrossCheck::NotRun))
+}
+
+/// The key in an image's header.
+fn key_of(image: &Raster) -> Option<&Attribute> {
+    image.picture().attribute("pipeline:key")
 }
 
 /// The channels of a result that its reference has too; what the result lacks is left out and shows as a difference of shape.

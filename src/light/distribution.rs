@@ -8,8 +8,14 @@ pub struct Distribution {
     cumulative: Vec<f32>,
 }
 
+/// Random numbers in [0, 1) are multiples of one part in this.
+const GRID: f64 = (1u32 << 24) as f64;
+
 impl Distribution {
     /// A distribution in proportion to `weights`, which must not be negative; NaN counts as 0.
+    ///
+    /// Probabilities are multiples of 2⁻²⁴, as the random numbers are: then a thing comes exactly as often as
+    /// [`Self::probability`] says, however rare.
     pub fn new(weights: &[f64]) -> Self {
         let total: f64 = weights.iter().copied().filter(|w| *w > 0.0).sum();
         if !(total > 0.0 && total.is_finite()) {
@@ -20,7 +26,7 @@ impl Distribution {
         cumulative.push(0.0);
         for w in weights {
             sum += w.max(0.0);
-            cumulative.push((sum / total) as f32);
+            cumulative.push(((sum / total * GRID).round() / GRID) as f32);
         }
         // Rounding must not leave a gap below 1: things after the last positive weight stay impossible.
         let last = cumulative[weights.len()];

@@ -201,7 +201,8 @@ impl ImageMap {
         let (top, bottom) = (self.row_cosines[row], self.row_cosines[row + 1]);
         let wi =
             self.direction((column as f32 + in_column) / self.columns as f32, top + (bottom - top) * in_row);
-        Some((wi.normalize(), self.cell_pdf(column, row)))
+        let pdf = self.cell_pdf(column, row);
+        (pdf > 0.0).then(|| (wi.normalize(), pdf))
     }
 
     fn pdf(&self, wi: Vec3) -> f32 {
@@ -215,7 +216,12 @@ impl ImageMap {
     /// Constant over a cell, per unit solid angle.
     fn cell_pdf(&self, column: usize, row: usize) -> f32 {
         let solid_angle = (self.row_cosines[row] - self.row_cosines[row + 1]) * TAU / self.columns as f32;
-        self.rows.probability(row) * self.in_row[row].probability(column) / solid_angle
+        // At the poles of an image of thousands of rows the band is empty in f32.
+        if solid_angle > 0.0 {
+            self.rows.probability(row) * self.in_row[row].probability(column) / solid_angle
+        } else {
+            0.0
+        }
     }
 }
 

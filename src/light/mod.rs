@@ -21,7 +21,7 @@ pub use environment::EnvironmentLight;
 pub struct EmissiveTriangle {
     /// Its index among the scene's triangles, as the tracer numbers them.
     pub triangle: u32,
-    /// World positions, counter-clockwise from the front.
+    /// World positions, in the order that barycentric coordinates count.
     pub vertices: [Vec3; 3],
     /// Its mean radiance: only how often it is chosen depends on it.
     pub mean_radiance: Rgb,
@@ -122,7 +122,7 @@ impl Lights {
             }
         }
         by_triangle.sort_unstable();
-        let selection = Distribution::new(&powers);
+        let selection = Distribution::new(&with_floor(&powers));
         let environment = environment.map(|e| {
             let chosen = matches!(emitters.last(), Some(Emitter::Environment));
             let probability = if chosen { selection.probability(emitters.len() - 1) } else { 0.0 };
@@ -193,6 +193,21 @@ impl Lights {
         let radiance = environment.radiance(wi);
         Some((radiance, if *probability > 0.0 { probability * environment.pdf(wi) } else { 0.0 }))
     }
+}
+
+/// The least probability of a light, relative to all others together: random numbers have 24 bits, and what they could hardly
+/// choose would come as rare bright specks.
+const LEAST_SHARE: f64 = 1.0 / (1 << 22) as f64;
+
+/// Powers, none much smaller than their sum. Everything is divided by the largest first, so that the sum is finite.
+fn with_floor(powers: &[f64]) -> Vec<f64> {
+    let largest = powers.iter().copied().fold(0.0, f64::max);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return powers.to_vec();
+    }
+    let relative: Vec<f64> = powers.iter().map(|p| p / largest).collect();
+    let least = relative.iter().sum::<f64>() * LEAST_SHARE;
+    relative.into_iter().map(|p| p.max(least)).collect()
 }
 
 /// 1/area as a density of directions: distance²/(area·cos). None where it isn't finite.

@@ -85,8 +85,10 @@ pub(super) fn job_name<'a>(parts: impl Iterator<Item = (&'a str, &'a str)>) -> S
 /// A name alone, as a file's name.
 pub(super) fn plain_name(name: &str) -> String {
     let safe = safe(name);
-    // A name such as `..` or `.x` would be special.
-    capped(if safe.starts_with('.') { format!("_{safe}") } else { safe })
+    // A name such as `..` or `.x` would be special, and a contact sheet has names of its own.
+    let lower = safe.to_lowercase();
+    let is_sheet = lower == "sheet" || lower.starts_with("sheet-");
+    capped(if safe.starts_with('.') || is_sheet { format!("_{safe}") } else { safe })
 }
 
 /// Letters, digits and `.`, `_`, `+`, `-` stay; anything else becomes `_`.

@@ -133,7 +133,18 @@ impl Sampler {
     /// Four numbers in [0, 1) that are well distributed over the samples of a replicate, independent of all other sets.
     #[inline]
     pub fn set(&self, vertex: u32, purpose: Purpose) -> [f32; 4] {
-        let set = mix64(self.key ^ mix64((u64::from(vertex) << 8) | purpose as u64));
+        self.numbers(mix64(self.key ^ mix64((u64::from(vertex) << 8) | purpose as u64)))
+    }
+
+    /// As [`Self::set`], a set of its own for each `item` that is decided about at a vertex.
+    #[inline]
+    pub fn set_of(&self, vertex: u32, purpose: Purpose, item: u32) -> [f32; 4] {
+        let place = mix64((u64::from(vertex) << 8) | purpose as u64);
+        self.numbers(combine(self.key ^ place, u64::from(item)))
+    }
+
+    #[inline]
+    fn numbers(&self, set: u64) -> [f32; 4] {
         let index = owen_scramble(self.index, set as u32);
         let mut seed = set >> 32;
         let mut numbers = [0.0; 4];

@@ -21,6 +21,13 @@ pub struct Provenance<'a> {
     pub feature_level: &'a str,
 }
 
+impl Provenance<'_> {
+    fn filter(&self) -> String {
+        let name = format!("{:?}", self.settings.filter);
+        self.settings.filter_radius.map_or(name.clone(), |radius| format!("{name}, radius {radius}"))
+    }
+}
+
 /// Writes `provenance` into the header of every part.
 pub fn stamp(raster: &mut Raster, provenance: &Provenance<'_>) {
     let text = |s: &str| Attribute::Text(s.to_owned());
@@ -29,7 +36,9 @@ pub fn stamp(raster: &mut Raster, provenance: &Provenance<'_>) {
     let settings = provenance.settings;
     let attributes = [
         ("Software", text(&format!("pipeline {}", provenance.build))),
+        ("pipeline:camera", text(settings.camera.as_deref().unwrap_or_default())),
         ("pipeline:feature_level", text(provenance.feature_level)),
+        ("pipeline:filter", text(&provenance.filter())),
         ("pipeline:identity", text(provenance.identity)),
         ("pipeline:job", text(&provenance.job.name)),
         ("pipeline:key", text(provenance.key)),

@@ -39,7 +39,8 @@ pub struct Rendered {
     pub counts: Counts,
 }
 
-/// One pixel's result.
+/// One pixel's result: means over all its samples, where a sample that hits nothing has albedo and normal 0; the depth is the mean
+/// over those that hit something.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pixel {
     beauty: Rgb,
@@ -55,6 +56,8 @@ struct Pixel {
 struct Tile {
     pixels: Vec<Pixel>,
     rays: u64,
+    bad_count: u64,
+    /// The first of them.
     bad: Vec<BadSample>,
 }
 
@@ -74,7 +77,7 @@ pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderErr
 
     let mut pixels = vec![Pixel::default(); width as usize * height as usize];
     let mut counts = Counts { triangles: scene.geometry.triangle_count() as u64, ..Counts::default() };
-    for (i, tile) in tiles.iter().enumerate() {
+    for (i, tile) in tiles.into_iter().enumerate() {
         let (x0, y0) = (i as u32 % columns * TILE, i as u32 / columns * TILE);
         let tile_width = TILE.min(width - x0) as usize;
         for (row, line) in tile.pixels.chunks(tile_width).enumerate() {
@@ -82,8 +85,8 @@ pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderErr
             pixels[start..start + tile_width].copy_from_slice(line);
         }
         counts.rays += tile.rays;
-        counts.bad_samples += tile.bad.len() as u64;
-        counts.first_bad_samples.extend(&tile.bad);
+        counts.bad_samples += tile.bad_count;
+        counts.first_bad_samples.extend(tile.bad);
     }
     counts.paths = total_paths;
     counts.first_bad_samples.sort_unstable_by_key(|b| (b.y, b.x, b.sample));
@@ -119,7 +122,10 @@ fn render_pixel(scene: &Prepared, x: u32, y: u32, tile: &mut Tile) -> Pixel {
         tile.rays += path.rays;
         let r = path.radiance;
         if !r.is_finite() || r.r < 0.0 || r.g < 0.0 || r.b < 0.0 {
-            tile.bad.push(BadSample { x, y, sample });
+            tile.bad_count += 1;
+            if tile.bad.len() < NAMED_BAD_SAMPLES {
+                tile.bad.push(BadSample { x, y, sample });
+            }
             continue;
         }
         let replicate = sample as usize % replicates;

@@ -71,7 +71,7 @@ impl Geometry {
             vertices,
             origins,
             instances,
-            radius: (high - center).length().max(f32::MIN_POSITIVE),
+            radius: radius_of(high - center),
         })
     }
 
@@ -85,10 +85,9 @@ impl Geometry {
         self.origins[triangle as usize].0 as usize
     }
 
-    /// World positions and counter-clockwise orientation seen from the front, for the lights.
-    pub(super) fn front_facing(&self, triangle: u32) -> [Vec3; 3] {
-        let v = self.vertices[triangle as usize];
-        if self.instances[self.instance_of(triangle)].handedness < 0.0 { [v[0], v[2], v[1]] } else { v }
+    /// World positions, in the order that barycentric coordinates count.
+    pub(super) fn vertices(&self, triangle: u32) -> [Vec3; 3] {
+        self.vertices[triangle as usize]
     }
 
     /// Triangles with their instance's material.
@@ -117,6 +116,12 @@ impl Geometry {
             world: self.vertices[triangle as usize],
         }
     }
+}
+
+/// The length of a box's half diagonal as a finite number above 0, whatever the scale.
+fn radius_of(half_diagonal: Vec3) -> f32 {
+    let length = half_diagonal.as_dvec3().length();
+    length.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32
 }
 
 impl TrianglePoint<'_> {

@@ -38,7 +38,7 @@ enum Emitting {
 #[derive(Debug)]
 enum Covering {
     Opaque,
-    Varying { alpha: Param<f32>, cutoff: Option<f32>, vertex_color: bool },
+    Varying { alpha: Param<f32>, cutoff: Option<f32>, vertex_alpha: bool },
 }
 
 /// Where the shading frame's x axis comes from.
@@ -128,9 +128,9 @@ impl PreparedMaterial {
     pub(super) fn alpha(&self, scene: &Scene, at: &TrianglePoint<'_>) -> f32 {
         match &self.opacity {
             Covering::Opaque => 1.0,
-            Covering::Varying { alpha, cutoff, vertex_color } => {
+            Covering::Varying { alpha, cutoff, vertex_alpha } => {
                 let mut value = read_scalar(scene, alpha, at);
-                if *vertex_color {
+                if *vertex_alpha {
                     value *= at.color().w;
                 }
                 match cutoff {
@@ -217,7 +217,7 @@ fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f
 fn covering(material: &Material) -> Covering {
     let opacity = &material.opacity;
     let opaque = match opacity.alpha.constant() {
-        Some(alpha) if !material.vertex_color => alpha >= opacity.cutoff.unwrap_or(1.0),
+        Some(alpha) if !material.vertex_alpha => alpha >= opacity.cutoff.unwrap_or(1.0),
         _ => false,
     };
     if opaque {
@@ -226,7 +226,7 @@ fn covering(material: &Material) -> Covering {
     Covering::Varying {
         alpha: opacity.alpha.clone(),
         cutoff: opacity.cutoff,
-        vertex_color: material.vertex_color,
+        vertex_alpha: material.vertex_alpha,
     }
 }
 

@@ -53,6 +53,12 @@ pub enum RenderError {
         /// What is wrong with it.
         why: &'static str,
     },
+    /// A material emits more than a float holds.
+    #[error("material {material:?}: its emission, colour times strength, is beyond what a float holds")]
+    Emission {
+        /// The material.
+        material: String,
+    },
     /// Somebody asked to stop.
     #[error("stopped before the image was finished")]
     Cancelled,

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::Prepared;
 use super::surface::{Shading, Surface, offset};
-use crate::accel::Ray;
+use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::light::{LightPlace, LightSample};
 use crate::math::sobol::{Purpose, Sampler};
@@ -70,7 +70,7 @@ pub(super) fn trace(
     for vertex in 1.. {
         // Find the next surface, or leave the scene.
         path.rays += 1;
-        let Some(hit) = scene.geometry.bvh.closest(&ray) else {
+        let Some(hit) = next_surface(scene, sampler, vertex, &ray) else {
             if let Some((radiance, pdf_light)) = scene.lights.environment(ray.direction) {
                 let w_bsdf = last_scatter.map_or(1.0, |s| power_heuristic(s.pdf, pdf_light));
                 path.radiance += beta * radiance * w_bsdf;
@@ -78,13 +78,6 @@ pub(super) fn trace(
             break;
         };
         let surface = Surface::new(scene, &ray, &hit);
-
-        // A partly transparent surface lets its share of paths pass straight on.
-        let alpha = surface.material.alpha(&scene.scene, &surface.at);
-        if alpha < 1.0 && sampler.set(vertex, Purpose::Opacity)[0] >= alpha {
-            ray = surface.leave(ray.direction);
-            continue;
-        }
 
         // Add what the surface sends out by itself.
         let emitted = surface.emitted(scene);
@@ -144,6 +137,20 @@ pub(super) fn trace(
         }
     }
     path
+}
+
+/// The nearest surface that is there for this path: a partly transparent one lets its share of paths pass. Each triangle decides
+/// for itself, so that surfaces in the same plane are as transparent to paths as they are to shadow rays.
+#[inline]
+fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray: &Ray) -> Option<Hit> {
+    let bvh = &scene.geometry.bvh;
+    if scene.all_opaque {
+        return bvh.closest(ray);
+    }
+    bvh.closest_where(ray, |hit| {
+        let alpha = scene.material_of(hit.triangle).alpha(&scene.scene, &scene.geometry.at(hit));
+        alpha >= 1.0 || (alpha > 0.0 && sampler.set_of(vertex, Purpose::Opacity, hit.triangle)[0] < alpha)
+    })
 }
 
 /// What arrives from a light sample and is reflected to the viewer, weighed against BSDF sampling.

@@ -46,6 +46,11 @@ impl Prepared {
         check(settings, width, height)?;
         let film_camera = FilmCamera::new(&camera.name, &camera.item, width, height)?;
         let materials: Vec<_> = scene.materials.iter().map(|m| PreparedMaterial::new(&m.item)).collect();
+        for (material, prepared) in scene.materials.iter().zip(&materials) {
+            if prepared.mean_emission(&scene).is_some_and(|(radiance, _)| !radiance.is_finite()) {
+                return Err(RenderError::Emission { material: material.name.clone() });
+            }
+        }
         let lights = collect_lights(&scene, &geometry, &materials);
         let all_opaque = scene.instances.iter().all(|i| materials[i.material.0 as usize].is_opaque());
         Ok(Self {
@@ -141,12 +146,12 @@ fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), Rende
     positive("spp", settings.spp, 1 << 24, "between 1 and 16777216")?;
     positive("replicates", settings.replicates, 64, "between 1 and 64")?;
     positive("max_depth", settings.max_depth.saturating_add(1), 65_536, "between 0 and 65535")?;
-    if u64::from(width) * u64::from(height) > 1 << 28 {
+    if u64::from(width) * u64::from(height) > 1 << 26 {
         let value = format!("{width} × {height}");
         return Err(RenderError::Setting {
             setting: "width × height",
             value,
-            expected: "at most 2^28 pixels",
+            expected: "at most 2^26 pixels",
         });
     }
     match settings.filter_radius {
@@ -165,12 +170,7 @@ fn collect_lights(scene: &Scene, geometry: &Geometry, materials: &[PreparedMater
         .materials(scene)
         .filter_map(|(triangle, material)| {
             let (mean_radiance, sides) = emission[material.0 as usize]?;
-            Some(EmissiveTriangle {
-                triangle,
-                vertices: geometry.front_facing(triangle),
-                mean_radiance,
-                sides,
-            })
+            Some(EmissiveTriangle { triangle, vertices: geometry.vertices(triangle), mean_radiance, sides })
         })
         .collect();
     let punctual: Vec<_> = scene.lights.iter().map(|l| l.item).collect();

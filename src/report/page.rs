@@ -199,13 +199,7 @@ fn facts(record: &JobRecord) -> Vec<Fact> {
             settings.camera.as_ref().map(|c| format!(", camera {c:?}")).unwrap_or_default(),
         ),
     );
-    fact(
-        "seconds",
-        format!(
-            "import {:.2}, prepare {:.2}, render {:.2}, output {:.2}",
-            t.import, t.prepare, t.render, t.output
-        ),
-    );
+    fact("seconds", format!("prepare {:.2}, render {:.2}, output {:.2}", t.prepare, t.render, t.output));
     let counts = &record.counts;
     fact("counts", format!("{} paths, {} rays, {} triangles", counts.paths, counts.rays, counts.triangles));
     if counts.bad_samples > 0 {

@@ -36,7 +36,7 @@ pub(super) fn record(name: &str, outcome: Outcome, verdict: Verdict) -> JobRecor
         counts: Counts { paths: 2_764_800, rays: 9_000_000, triangles: 61_234, ..Counts::default() },
         skipped: vec!["clearcoat".to_owned()],
         warnings: vec![Warning::new("ball.glb: material \"ball\"", "no normals; made from the faces")],
-        timings: Timings { import: 0.25, prepare: 0.5, render: 3.0, output: 0.25 },
+        timings: Timings { prepare: 0.75, render: 3.0, output: 0.25 },
         host: "here".to_owned(),
         attempt: 1,
         outputs: BTreeMap::from([(format!("{name}.exr"), "b3".to_owned())]),

@@ -100,7 +100,7 @@ pub(crate) fn errors(verdict: &Verdict) -> Option<[f64; 2]> {
 /// The seconds of all steps.
 pub(crate) fn seconds(record: &JobRecord) -> f64 {
     let t = &record.timings;
-    t.import + t.prepare + t.render + t.output
+    t.prepare + t.render + t.output
 }
 
 /// A difference with three figures or so.

@@ -191,6 +191,7 @@ fn dump_material(out: &mut String, m: &Material) -> fmt::Result {
     line("rotation", m.rotation != default.rotation, &|| m.rotation.to_string());
     line("sides", m.sides != default.sides, &|| sides(m.sides).into());
     line("vertex_color", m.vertex_color != default.vertex_color, &|| m.vertex_color.to_string());
+    line("vertex_alpha", m.vertex_alpha != default.vertex_alpha, &|| m.vertex_alpha.to_string());
     lines.into_iter().try_for_each(|(name, text)| writeln!(out, "    {name}: {text}"))
 }
 

@@ -35,8 +35,10 @@ pub struct Material {
     pub rotation: f32,
     /// The sides that scatter light; the other side blocks.
     pub sides: Sides,
-    /// Whether the mesh's vertex colours multiply `base_color` and the opacity.
+    /// Whether the mesh's vertex colours multiply `base_color`.
     pub vertex_color: bool,
+    /// Whether their alpha multiplies the opacity.
+    pub vertex_alpha: bool,
 }
 
 impl Default for Material {
@@ -56,6 +58,7 @@ impl Default for Material {
             rotation: 0.0,
             sides: Sides::Both,
             vertex_color: false,
+            vertex_alpha: false,
         }
     }
 }

@@ -30,12 +30,12 @@ pub(super) fn present(
     let spec = &sweep.manifest.sheet;
     let mut entries = Vec::with_capacity(sweep.jobs.len());
     for job in &sweep.jobs {
-        let record = records.iter().find(|r| r.job.name == job.name);
-        let picture = picture(&job::image_path(folder, &job.name), spec.cell_width)?;
-        let cell = match (record, picture) {
-            (Some(record), picture) => Cell::of(record, picture),
-            (None, Some(picture)) => Cell::Picture { picture, mark: None },
-            (None, None) => Cell::Missing,
+        let own = records.iter().find(|r| r.job.name == job.name);
+        // Another shard's, or an earlier run's; what is there of another job of this name is not shown.
+        let earlier = if own.is_none() { job::recorded(job, folder) } else { None };
+        let cell = match own.or(earlier.as_ref()) {
+            Some(record) => Cell::of(record, picture(&job::image_path(folder, &job.name), spec.cell_width)?),
+            None => Cell::Missing,
         };
         entries.push(Entry { job, cell });
     }

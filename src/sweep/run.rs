@@ -29,7 +29,7 @@ pub struct Options {
     pub idiff: Option<PathBuf>,
 }
 
-/// The `index`-th of `count` parts of the jobs, split by key: every machine comes to the same split.
+/// The `index`-th of `count` parts of the jobs, split by name: every machine comes to the same split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 1.
@@ -39,8 +39,9 @@ pub struct Shard {
 }
 
 impl Shard {
-    fn holds(self, key: &str) -> bool {
-        let number = u64::from_str_radix(key.get(..15).unwrap_or("0"), 16).unwrap_or(0);
+    fn holds(self, job: &Job) -> bool {
+        let hash = blake3::hash(job.name.as_bytes());
+        let number = hash.as_bytes().iter().take(7).fold(0, |n, byte| n << 8 | u64::from(*byte));
         number % u64::from(self.count) == u64::from(self.index - 1)
     }
 }
@@ -87,26 +88,28 @@ pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Res
         }
     }
 
-    let mut records = Vec::new();
+    let mut records: Vec<(usize, JobRecord)> = Vec::new();
     let mut reused = 0;
-    for job in &sweep.jobs {
+    for (index, job) in scene_by_scene(&sweep.jobs) {
         match run_job(job, scenes.get(&job.scene), &build, &destination, options, observer)? {
             Turn::LeftOut => observer.left_out(job),
             Turn::Reused(record) => {
                 reused += 1;
                 observer.finished(&record, true);
-                records.push(record);
+                records.push((index, record));
             }
             Turn::Done(record) => {
                 observer.finished(&record, false);
                 let failed = matches!(record.outcome, Outcome::Failed { .. });
-                records.push(record);
+                records.push((index, record));
                 if failed && options.fail_fast {
                     break;
                 }
             }
         }
     }
+    records.sort_by_key(|(index, _)| *index);
+    let records: Vec<JobRecord> = records.into_iter().map(|(_, record)| record).collect();
     let presentation = present::present(sweep, &records, reused, &destination.folder);
     Ok(SweepResult { records, reused, presentation })
 }
@@ -125,6 +128,9 @@ fn run_job(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Turn, SweepError> {
+    if options.shard.is_some_and(|shard| !shard.holds(job)) {
+        return Ok(Turn::LeftOut);
+    }
     let planned = loaded.and_then(|loaded| {
         let planned = job::plan(job, loaded, build).map_err(|error| error.to_string())?;
         Ok((planned, loaded))
@@ -135,9 +141,6 @@ fn run_job(
             return Ok(Turn::Done(job::failed_record(job, build, &destination.folder, &error)?));
         }
     };
-    if options.shard.is_some_and(|shard| !shard.holds(&planned.key)) {
-        return Ok(Turn::LeftOut);
-    }
     if !options.force
         && let Some(mut record) = job::finished(&planned, &destination.folder)
     {
@@ -181,9 +184,21 @@ impl Scenes {
 
 /// The scenes of the jobs, each once, in order.
 fn scene_paths(jobs: &[Job]) -> Vec<&Path> {
-    let mut paths: Vec<&Path> = jobs.iter().map(|j| j.scene.as_path()).collect();
-    paths.dedup();
+    let mut paths: Vec<&Path> = Vec::new();
+    for job in jobs {
+        if !paths.contains(&job.scene.as_path()) {
+            paths.push(&job.scene);
+        }
+    }
     paths
+}
+
+/// The jobs with their places, those of one scene together, so that each scene is loaded once.
+fn scene_by_scene(jobs: &[Job]) -> Vec<(usize, &Job)> {
+    let scenes = scene_paths(jobs);
+    let mut ordered: Vec<(usize, &Job)> = jobs.iter().enumerate().collect();
+    ordered.sort_by_key(|(_, job)| scenes.iter().position(|scene| *scene == job.scene));
+    ordered
 }
 
 /// The folder of results and those that job names lead into, without what a killed run left half written.
@@ -237,10 +252,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_key_belongs_to_one_shard() {
+    fn every_job_belongs_to_one_shard() {
         for i in 0..100u8 {
-            let key = blake3::hash(&[i]).to_hex().to_string();
-            let holders = (1..=3).filter(|&index| Shard { index, count: 3 }.holds(&key)).count();
+            let job = Job {
+                name: format!("roughness={i}"),
+                scene: PathBuf::new(),
+                overrides: Vec::new(),
+                settings: crate::settings::RenderSettings::default(),
+                coordinates: Vec::new(),
+            };
+            let holders = (1..=3).filter(|&index| Shard { index, count: 3 }.holds(&job)).count();
             assert_eq!(holders, 1);
         }
     }

@@ -42,7 +42,10 @@ pub(super) fn set(material: &mut Material, field: MaterialField, value: &Value) 
             material.emission.color = Param::Constant(color);
         }
         MaterialField::EmissionStrength => material.emission.strength = value::not_negative(value)?,
-        MaterialField::Opacity => material.opacity.alpha = Param::Constant(value::number(value, 0.0, 1.0)?),
+        MaterialField::Opacity => {
+            material.opacity.alpha = Param::Constant(value::number(value, 0.0, 1.0)?);
+            material.vertex_alpha = false;
+        }
         MaterialField::Cutoff => {
             material.opacity.cutoff = value::or_none(value, |v| value::number(v, 0.0, 1.0))?;
         }
