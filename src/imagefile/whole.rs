@@ -30,7 +30,7 @@ fn place(path: &Path, bytes: &[u8]) -> io::Result<()> {
         _ => Path::new("."),
     };
     let mut file = claimed(folder)?;
-    file.write_all(bytes)?;
+    file.as_file_mut().write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|failed| failed.error)?;
     sync_folder(folder)
@@ -98,7 +98,14 @@ fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
         // The process' mask takes away what it should; tempfile's own default is for secrets.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    builder.tempfile_in(folder).map_err(without_name)
+}
+
+/// The system's own reason: nobody asked for the temporary name, which is another each time.
+fn without_name(error: io::Error) -> io::Error {
+    let system =
+        error.get_ref().and_then(|named| named.source()?.downcast_ref::<io::Error>()?.raw_os_error());
+    system.map_or(error, io::Error::from_raw_os_error)
 }
 
 /// The new name itself is in the folder, which has its own place on the disk.
@@ -141,7 +148,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sub/a.bin");
         let error = write_whole(&path, b"x").unwrap_err();
-        assert!(error.to_string().contains("a.bin"), "{error}");
+        assert!(error.to_string().contains("a.bin") && !error.to_string().contains(PREFIX), "{error}");
         assert!(names(folder.path()).is_empty());
     }
 
