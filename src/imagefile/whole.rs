@@ -101,11 +101,10 @@ fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(folder).map_err(without_name)
 }
 
-/// The system's own reason: nobody asked for the temporary name, which is another each time.
+/// The reason alone: nobody asked for the temporary name, which is another each time. `tempfile` hides the system's number behind
+/// it, not its kind.
 fn without_name(error: io::Error) -> io::Error {
-    let system =
-        error.get_ref().and_then(|named| named.source()?.downcast_ref::<io::Error>()?.raw_os_error());
-    system.map_or(error, io::Error::from_raw_os_error)
+    if error.get_ref().is_some() { error.kind().into() } else { error }
 }
 
 /// The new name itself is in the folder, which has its own place on the disk.
