@@ -30,7 +30,7 @@ fn place(path: &Path, bytes: &[u8]) -> io::Result<()> {
         _ => Path::new("."),
     };
     let mut file = claimed(folder)?;
-    file.write_all(bytes)?;
+    file.as_file_mut().write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|failed| failed.error)?;
     sync_folder(folder)
@@ -98,7 +98,13 @@ fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
         // The process' mask takes away what it should; tempfile's own default is for secrets.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    builder.tempfile_in(folder).map_err(without_name)
+}
+
+/// The reason alone: nobody asked for the temporary name, which is another each time. `tempfile` hides the system's number behind
+/// it, not its kind.
+fn without_name(error: io::Error) -> io::Error {
+    if error.get_ref().is_some() { error.kind().into() } else { error }
 }
 
 /// The new name itself is in the folder, which has its own place on the disk.
@@ -141,7 +147,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sub/a.bin");
         let error = write_whole(&path, b"x").unwrap_err();
-        assert!(error.to_string().contains("a.bin"), "{error}");
+        assert!(error.to_string().contains("a.bin") && !error.to_string().contains(PREFIX), "{error}");
         assert!(names(folder.path()).is_empty());
     }
 

@@ -71,15 +71,15 @@ fn what_cannot_be_read_is_2_and_named() {
 fn idiff_mode_has_idiff_s_codes_and_text() {
     let desk = desk();
     let same = diff(&desk, "--mode idiff a.exr a.exr").ends_with(0);
-    assert_eq!(same.stdout, "PASS\n");
+    assert_eq!(same.stdout, "Comparing \"a.exr\" and \"a.exr\"\nPASS\n");
     let failure = diff(&desk, "--mode idiff a.exr b.exr").ends_with(2);
     let lines: Vec<&str> = failure.stdout.lines().collect();
     assert_eq!(lines[0], "Comparing \"a.exr\" and \"b.exr\"");
     assert!(lines[1].starts_with("  Mean error = "));
     assert!(lines[4].starts_with("  Max error  = 0.25 @ (2, 1, R)"), "{}", failure.stdout);
     assert_eq!(lines.last(), Some(&"FAILURE"));
-    diff(&desk, "--mode idiff --fail 0.3 a.exr b.exr").ends_with(1).says("WARNING\n");
-    diff(&desk, "--mode idiff --fail 0.3 --warn 0.3 a.exr b.exr").ends_with(0).says("PASS\n");
+    diff(&desk, "--mode idiff --failpercent 50 a.exr b.exr").ends_with(1).says("WARNING\n");
+    diff(&desk, "--mode idiff --failpercent 50 --warnpercent 50 a.exr b.exr").ends_with(0).says("PASS\n");
     let quiet = diff(&desk, "--mode idiff -Q a.exr b.exr").ends_with(2);
     assert_eq!((quiet.stdout.as_str(), quiet.stderr.as_str()), ("", "FAILURE\n"));
     diff(&desk, "--mode idiff a.exr none.exr").ends_with(4).tells("idiff ERROR: ").tells("none.exr");

@@ -3,7 +3,7 @@
 use pipeline::imagefile;
 use pipeline::record::Outcome;
 
-use crate::support::{Desk, SMALL, error_of, repository};
+use crate::support::{Desk, SMALL, error_of, images, leftovers, repository};
 
 /// A folder with a missing scene, a broken one and a good one, in this order.
 fn mixed() -> Desk {
@@ -86,37 +86,65 @@ fn an_image_that_cannot_be_written_fails_its_job_alone() {
     desk.sweep(&[]).ends_with(0).says("3 jobs: 1 rendered, 2 reused\n");
 }
 
+/// A file system in memory, while this lives.
+#[cfg(target_os = "linux")]
+struct Disk {
+    folder: std::path::PathBuf,
+}
+
+#[cfg(target_os = "linux")]
+impl Disk {
+    /// Of that size, where mounting is allowed.
+    fn mount(folder: std::path::PathBuf, size: &str) -> Option<Self> {
+        std::fs::create_dir(&folder).unwrap();
+        let disk = Self { folder };
+        disk.mounted(&format!("size={size}")).then_some(disk)
+    }
+
+    fn mounted(&self, options: &str) -> bool {
+        let mut mount = std::process::Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", options, "tmpfs"]).arg(&self.folder);
+        mount.output().is_ok_and(|output| output.status.success())
+    }
+}
+
+#[cfg(target_os = "linux")]
+impl Drop for Disk {
+    fn drop(&mut self) {
+        // Where nothing was mounted there is nothing to take away.
+        let _ = std::process::Command::new("umount").arg(&self.folder).output();
+    }
+}
+
 /// Needs the right to mount.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_told_and_the_sweep_goes_on_when_there_is_room() {
-    use std::process::Command;
     let desk = Desk::with_three_jobs("");
-    let disk = desk.path("disk");
-    std::fs::create_dir(&disk).unwrap();
-    let mount = Command::new("mount").args(["-t", "tmpfs", "-o", "size=64k", "tmpfs"]).arg(&disk).output();
-    if !mount.is_ok_and(|o| o.status.success()) {
+    let Some(disk) = Disk::mount(desk.path("disk"), "24k") else {
         use std::io::Write;
-        writeln!(std::io::stderr(), "skipped: a full disk: a small file system can't be mounted here")
+        writeln!(std::io::stderr(), "skipped: a full disk: no small file system can be mounted here")
             .unwrap();
         return;
-    }
-    let mounted = Mounted(&disk);
+    };
     let scene = repository("scenes/spheres.glb");
     let large = ["--width", "160", "--height", "120", "--spp", "1"];
     let render = ["render", scene.to_str().unwrap(), "-o", "disk/a.exr"];
-    let rendered = desk.run(render.iter().chain(&large)).ends_with(2).tells("disk/a.exr");
-    let images = desk.sweep(&["-o", "disk"]);
-    let names = desk.names("disk");
-    drop(mounted);
-    rendered.tells("No space left on device");
-    images.ends_with(2).says("No space left on device").tells_not("panicked");
-    assert!(!names.iter().any(|n| n.starts_with('.')), "{names:?}");
+    let run = desk.run(render.iter().chain(&large)).ends_with(2);
+    run.tells("disk/a.exr").tells("No space left on device").tells_not(".writing-");
+    assert!(desk.names("disk").is_empty(), "neither the image nor a part of it");
 
-    struct Mounted<'a>(&'a std::path::Path);
-    impl Drop for Mounted<'_> {
-        fn drop(&mut self) {
-            let _ = Command::new("umount").arg(self.0).status();
-        }
+    let run = desk.sweep(&["-o", "disk"]).ends_with(2).tells("No space left on device").tells_not("panicked");
+    let names = desk.names("disk");
+    assert!(leftovers(&names).is_empty(), "{names:?}");
+    let done = images(&names).len();
+    assert!(done < 3 && !names.contains(&"sheet.png".to_owned()), "{names:?} {run:?}");
+
+    assert!(disk.mounted("remount,size=4m"));
+    desk.sweep(&["-o", "disk"]).ends_with(0).says(&format!("3 jobs: {} rendered, {done} reused", 3 - done));
+    let roomy = Desk::with_three_jobs("");
+    roomy.sweep(&[]).ends_with(0);
+    for (name, bytes) in roomy.image_bytes() {
+        assert!(desk.bytes(&format!("disk/{name}")) == bytes, "{name}");
     }
 }

@@ -29,7 +29,7 @@ fn an_unknown_material_lists_what_the_scene_has_and_nothing_is_rendered() {
     desk.sweep(&[])
         .ends_with(2)
         .tells("the scene has no material `flor`")
-        .tells("sweep.toml:11:1")
+        .tells("sweep.toml:12:1")
         .tells("did you mean `floor`? it has the materials `floor`, `textured`, `masked`, ");
     assert!(desk.images().is_empty());
 }

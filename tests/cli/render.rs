@@ -155,7 +155,7 @@ fn one_sample_s_path_is_printed_and_adds_up_to_its_pixel() {
 #[test]
 fn missing_and_unknown_scenes_are_named() {
     let desk = desk();
-    render(&desk, "none.glb", &["-o", "a.exr"]).ends_with(2).tells("error: cannot read none.glb: ");
+    render(&desk, "none.glb", &["-o", "a.exr"]).ends_with(2).tells("error: cannot read ").tells("none.glb: ");
     render(&desk, ".", &["-o", "a.exr"]).ends_with(2).tells("error: ");
     std::fs::write(desk.path("model.fbx"), "x").unwrap();
     render(&desk, "model.fbx", &["-o", "a.exr"]).ends_with(2).tells("model.fbx");

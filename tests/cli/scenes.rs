@@ -1,8 +1,8 @@
 //! The scenes that come with the project.
 
-use pipeline::raster::Attribute;
+use pipeline::raster::{Attribute, Raster};
 
-use crate::support::{Desk, SMALL_ARGUMENTS, repository, same_pixels};
+use crate::support::{Desk, SMALL_ARGUMENTS, repository};
 
 /// Every scene by its file.
 const SCENES: [&str; 8] = [
@@ -34,12 +34,14 @@ fn no_scene_has_a_bad_sample_or_a_black_picture() {
     }
 }
 
-/// One box written twice: both have the same triangles, materials and light, so with Aris' camera both give the same bits.
+/// One box written twice, with the same triangles in the same order, materials and light: with Aris' camera all pixels have the
+/// same bits but some on the spheres' outlines. There an interpolated normal may face away from the viewer, where a surface of
+/// Aris, which has one side, is black, and one of OBJ, which has two, is not.
 #[test]
 fn the_cornell_box_as_obj_and_as_aris_scene_is_the_same_picture() {
     let desk = Desk::with_three_jobs("");
-    let (obj, aris) =
-        (repository("scenes/cornell.obj"), repository("scenes/aris/config/scene/cbox_diffuse.yaml"));
+    let obj = repository("scenes/cornell.obj");
+    let aris = repository("scenes/aris/config/scene/cbox_diffuse.yaml");
     let size = ["--width", "48", "--height", "36", "--spp", "16"];
     let camera = [
         "--set",
@@ -56,9 +58,26 @@ fn the_cornell_box_as_obj_and_as_aris_scene_is_the_same_picture() {
         desk.raster(output)
     };
     let (from_obj, from_aris) = (render(&obj, "obj.exr", &camera), render(&aris, "aris.exr", &[]));
-    desk.run(["diff", "obj.exr", "aris.exr"]).ends_with(0).says("\n\nsame\n");
-    assert!(same_pixels(&from_obj, &from_aris));
-    let key = |raster: &pipeline::raster::Raster| match raster.picture().attribute("pipeline:key") {
+    let plane = |raster: &Raster, part: usize, name: &str| -> Vec<u32> {
+        raster.layers[part].channel(name).expect(name).values.iter().map(|v| v.to_bits()).collect()
+    };
+    assert!(plane(&from_obj, 1, "Z") == plane(&from_aris, 1, "Z"), "the same triangles from the same place");
+    let unequal = |part: usize, names: &[&str]| -> Vec<usize> {
+        let planes: Vec<_> =
+            names.iter().map(|n| (plane(&from_obj, part, n), plane(&from_aris, part, n))).collect();
+        (0..48 * 36).filter(|&i| planes.iter().any(|(a, b)| a[i] != b[i])).collect()
+    };
+    let (colors, normals) = (unequal(0, &["R", "G", "B"]), unequal(1, &["normal.X", "normal.Y", "normal.Z"]));
+    assert!(colors.len() <= 48 * 36 / 200, "{} pixels differ", colors.len());
+    assert!(
+        normals.iter().all(|i| colors.contains(i)) && colors.len() <= normals.len() + 2,
+        "{colors:?} {normals:?}"
+    );
+    // So few samples do not move the mean.
+    desk.run(["diff", "obj.exr", "aris.exr", "--fail", "0.2", "--mean", "0.0002"])
+        .ends_with(0)
+        .says("within limits");
+    let key = |raster: &Raster| match raster.picture().attribute("pipeline:key") {
         Some(Attribute::Text(key)) => key.clone(),
         other => panic!("{other:?}"),
     };

@@ -221,14 +221,10 @@ pub(crate) fn error_of(record: &JobRecord) -> &str {
 
 /// Whether every channel of every part has the same bits, whatever the headers say.
 pub(crate) fn same_pixels(a: &Raster, b: &Raster) -> bool {
-    let bits = |raster: &Raster| -> Vec<(String, Vec<(String, Vec<u32>)>)> {
-        let channels = |l: &pipeline::raster::Layer| {
-            l.channels
-                .iter()
-                .map(|c| (c.name.clone(), c.values.iter().map(|v| v.to_bits()).collect()))
-                .collect()
-        };
-        raster.layers.iter().map(|l| (l.name.clone(), channels(l))).collect()
+    let planes = |raster: &Raster| -> Vec<(String, String, Vec<u32>)> {
+        let channels = raster.layers.iter().flat_map(|l| l.channels.iter().map(move |c| (l, c)));
+        let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect();
+        channels.map(|(l, c)| (l.name.clone(), c.name.clone(), bits(&c.values))).collect()
     };
-    a.display == b.display && bits(a) == bits(b)
+    a.display == b.display && planes(a) == planes(b)
 }
