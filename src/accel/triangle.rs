@@ -7,13 +7,15 @@ use super::Ray;
 /// A triangle as traversal reads it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle {
-    vertices: [Vec3; 3],
+    /// As arrays: a vector's components can't be indexed without a branch.
+    vertices: [[f32; 3]; 3],
 }
 
 /// A ray in the space where it is the z axis: what all its triangle tests share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShearedRay {
-    origin: Vec3,
+    /// Along `axes`.
+    origin: [f32; 3],
     /// The axes, the last one the direction's largest.
     axes: [usize; 3],
     shear: [f32; 3],
@@ -36,30 +38,31 @@ impl ShearedRay {
         if d[kz] < 0.0 {
             std::mem::swap(&mut kx, &mut ky);
         }
-        Self { origin: ray.origin, axes: [kx, ky, kz], shear: [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]] }
+        let axes = [kx, ky, kz];
+        Self { origin: axes.map(|k| ray.origin[k]), axes, shear: [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]] }
     }
 
     /// A point in the ray's space: sheared x and y, and unscaled z.
     #[inline(always)]
-    fn shear(&self, p: Vec3) -> (f32, f32, f32) {
-        let p = p - self.origin;
+    fn shear(&self, p: &[f32; 3]) -> (f32, f32, f32) {
         let [kx, ky, kz] = self.axes;
-        let z = p[kz];
-        (p[kx] - self.shear[0] * z, p[ky] - self.shear[1] * z, z)
+        let z = p[kz] - self.origin[2];
+        let (x, y) = (p[kx] - self.origin[0], p[ky] - self.origin[1]);
+        (x - self.shear[0] * z, y - self.shear[1] * z, z)
     }
 }
 
 impl Triangle {
-    pub(super) const fn new(vertices: [Vec3; 3]) -> Self {
-        Self { vertices }
+    pub(super) fn new(vertices: [Vec3; 3]) -> Self {
+        Self { vertices: vertices.map(|v| v.to_array()) }
     }
 
     /// The ray parameter in (0, `t_max`) and the barycentric coordinates, if the ray hits either side.
     #[inline(always)]
     pub(super) fn intersect(&self, ray: &ShearedRay, t_max: f32) -> Option<(f32, [f32; 3])> {
-        let (ax, ay, az) = ray.shear(self.vertices[0]);
-        let (bx, by, bz) = ray.shear(self.vertices[1]);
-        let (cx, cy, cz) = ray.shear(self.vertices[2]);
+        let (ax, ay, az) = ray.shear(&self.vertices[0]);
+        let (bx, by, bz) = ray.shear(&self.vertices[1]);
+        let (cx, cy, cz) = ray.shear(&self.vertices[2]);
         // Two neighbours compute a shared edge's function from the same products, so that they agree on its sign.
         let mut u = cx * by - cy * bx;
         let mut v = ax * cy - ay * cx;

@@ -83,7 +83,7 @@ fn the_roughness_sweep_is_eleven_jobs_named_by_value() {
     assert_eq!(job.scene, Path::new("configs/../scenes/shaderball.glb"));
     let set = |path: &str, n| Override { path: path.into(), value: Value::Number(n) };
     assert_eq!(job.overrides, [set("material.ball.metallic", 1.0), set("material.ball.roughness", 0.3)]);
-    assert_eq!((job.settings.width, job.settings.height, job.settings.spp), (Some(240), Some(180), 64));
+    assert_eq!((job.settings.width, job.settings.height, job.settings.spp), (Some(208), Some(156), 64));
     let c = &job.coordinates[0];
     assert_eq!((c.axis.as_str(), c.index, c.label.as_str()), ("material.ball.roughness", 3, "0.30"));
     let compare = manifest.compare.as_ref().unwrap();
