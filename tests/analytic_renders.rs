@@ -172,3 +172,78 @@ fn depth_normal_and_albedo_layers_tell_the_first_surface() {
         }
     }
 }
+
+/// A decal in the plane of what it lies on: a fully transparent one changes nothing, a half transparent one hides half.
+#[test]
+fn a_transparent_sheet_in_the_plane_of_a_surface_does_not_hide_it() {
+    for (alpha, expected) in [(0.0, 1.0), (0.5, 0.5)] {
+        let mut sheet = lambert(0.0);
+        sheet.opacity = Opacity { alpha: Param::Constant(alpha), cutoff: None };
+        let tilted = |mut mesh: pipeline::scene::Mesh| {
+            let turn = glam::Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 0.7);
+            mesh.positions.iter_mut().for_each(|p| *p = turn * *p);
+            mesh
+        };
+        let parts =
+            vec![(tilted(square(5.0, 0.0)), sheet), (tilted(square(5.0, 0.0)), emitting(lambert(0.0), 1.0))];
+        let rendered = render_scene(&scene(parts, from_above(2.0)), &small(16, 16, 256, 2));
+        // Where rays meet both at the same distance, the order is rounding's choice; each decides for itself all the same.
+        let seen = mean(&rendered);
+        let in_order = seen - expected;
+        assert!(in_order > -0.01 && (alpha > 0.0 || in_order < 0.01), "alpha {alpha}: {seen}");
+    }
+}
+
+/// A mirrored instance of a light is the light of the mirrored mesh, shadows and textures included.
+#[test]
+fn a_mirrored_light_shines_like_the_same_light_modelled_so() {
+    let mut lamp = emitting(lambert(0.0), 6.0);
+    lamp.emission.sides = Sides::Both;
+    let triangle = |side: f32| pipeline::scene::Mesh {
+        name: "light".into(),
+        positions: vec![
+            Vec3::new(side * 0.1, 1.0, -0.6),
+            Vec3::new(side * 1.4, 1.2, -0.2),
+            Vec3::new(side * 0.4, 1.1, 0.9),
+        ],
+        triangles: vec![[0, 1, 2]],
+        ..pipeline::scene::Mesh::default()
+    };
+    let occluder = || {
+        let mut mesh = square(0.3, 0.6);
+        mesh.positions.iter_mut().for_each(|p| p.x += 0.5);
+        mesh
+    };
+    let camera = || Camera::look_at(Vec3::new(0.0, 0.9, 0.01), Vec3::ZERO, Vec3::Z, 1.2);
+    let world = |light| {
+        scene(
+            vec![(square(3.0, 0.0), lambert(0.7)), (occluder(), lambert(0.2)), (light, lamp.clone())],
+            camera(),
+        )
+    };
+    let plain = render_scene(&world(triangle(1.0)), &small(24, 24, 512, 3));
+    let mut mirrored = world(triangle(-1.0));
+    mirrored.instances[2].world_from_object = glam::Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    let mirrored = render_scene(&mirrored, &small(24, 24, 512, 3));
+    let [a, ..] = plain.raster.picture().rgb().expect("colour");
+    let [b, ..] = mirrored.raster.picture().rgb().expect("colour");
+    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+        assert!((a - b).abs() <= 1e-4 * (a + b), "pixel {i}: {a} {b}");
+    }
+}
+
+#[test]
+fn a_vertex_at_the_end_of_space_does_not_put_the_lights_out() {
+    let far = pipeline::scene::Mesh {
+        name: "far".into(),
+        positions: vec![Vec3::splat(1e20), Vec3::new(1.1e20, 1e20, 1e20), Vec3::new(1e20, 1.1e20, 1e20)],
+        triangles: vec![[0, 1, 2]],
+        ..pipeline::scene::Mesh::default()
+    };
+    let mut world = scene(vec![(square(5.0, 0.0), lambert(0.5)), (far, lambert(0.5))], from_above(1.0));
+    let kind = LightKind::Directional { direction: -Vec3::Y };
+    world.lights.push(Named::new("sun", Light { kind, color: Rgb::WHITE, intensity: 1.0 }));
+    let rendered = render_scene(&world, &small(4, 4, 4, 2));
+    let exact = 0.5 / std::f64::consts::PI;
+    assert!((mean(&rendered) / exact - 1.0).abs() < 1e-3, "{}", mean(&rendered));
+}
