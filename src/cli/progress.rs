@@ -13,12 +13,18 @@ use crate::render::Control;
 
 /// Steps of the bar a job has: its samples move it smoothly.
 const STEPS: u64 = 1000;
+/// Characters of a job's name that the bar shows.
+const LONGEST_NAME: usize = 32;
 /// Between two looks at a running render.
 const INTERVAL: Duration = Duration::from_millis(100);
 
 /// A bar over some jobs, which follows the samples of the one that runs.
 pub(super) struct Progress {
     bar: ProgressBar,
+    jobs: usize,
+    /// Jobs that are done, reused ones included.
+    seen: usize,
+    /// Jobs that were rendered.
     done: u64,
     follower: Option<Follower>,
 }
@@ -33,11 +39,11 @@ impl Progress {
     pub(super) fn new(jobs: usize, talk: Talk) -> Self {
         let shown = talk == Talk::Normal && std::io::stderr().is_terminal();
         let bar = if shown { ProgressBar::new(jobs as u64 * STEPS) } else { ProgressBar::hidden() };
-        let template = "{prefix} {bar:32} {percent:>3}%  {msg}  {elapsed} elapsed, {eta} left";
+        let template = "{prefix} {wide_bar} {percent:>3}%, {msg}, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("━╸─"));
         }
-        Self { bar, done: 0, follower: None }
+        Self { bar, jobs, seen: 0, done: 0, follower: None }
     }
 
     /// Follows a render until [`Self::finish_job`].
@@ -45,7 +51,8 @@ impl Progress {
         if self.bar.is_hidden() {
             return;
         }
-        self.bar.set_prefix(name.to_owned());
+        let short: String = name.chars().take(LONGEST_NAME).collect();
+        self.bar.set_prefix(format!("{}/{} {short}", self.seen + 1, self.jobs));
         let stop = Arc::new(AtomicBool::new(false));
         let (bar, control, done, stopped) =
             (self.bar.clone(), Arc::clone(control), self.done, Arc::clone(&stop));
@@ -56,7 +63,7 @@ impl Progress {
                 if let Some(steps) = (paths.min(total) * STEPS).checked_div(total) {
                     bar.set_position(done * STEPS + steps);
                     bar.set_message(format!(
-                        "{:.1} of {:.1} M samples",
+                        "{:.1}/{:.1} M samples",
                         paths as f64 * 1e-6,
                         total as f64 * 1e-6
                     ));
@@ -70,6 +77,7 @@ impl Progress {
     /// A job is done. Work that was not done now does not count for the time left.
     pub(super) fn finish_job(&mut self, reused: bool) {
         self.stop_following();
+        self.seen += 1;
         if reused {
             self.bar.dec_length(STEPS);
         } else {

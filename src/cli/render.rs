@@ -11,7 +11,7 @@ use crate::disney::DiffuseModel;
 use crate::imagefile;
 use crate::import::{ImportOptions, LightUnits};
 use crate::job::{self, Build, JobError, LoadedScene, PlannedJob};
-use crate::output::{Provenance, stamp, tone};
+use crate::output::{stamp, tone};
 use crate::raster::Raster;
 use crate::record::{Job, Override, Value};
 use crate::render::{Control, Prepared, RenderError, render, replay};
@@ -134,17 +134,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         return tell_path(&prepared, &planned, x, y, sample);
     }
     let mut rendered = render_with_progress(&prepared, &planned, &loaded, talk)?;
-    stamp(
-        &mut rendered,
-        &Provenance {
-            identity: &planned.identity,
-            key: &planned.key,
-            job: &planned.job,
-            settings: &planned.settings,
-            build: build.version,
-            feature_level: build.feature_level,
-        },
-    );
+    stamp(&mut rendered, &planned.provenance(&build));
     if let (Some(output), Some(format)) = (&arguments.output, format) {
         write(output, format, &rendered, &Display { tone: arguments.tone, exposure: arguments.exposure })?;
     }

@@ -37,6 +37,20 @@ pub struct PlannedJob {
     pub warnings: Vec<Warning>,
 }
 
+impl PlannedJob {
+    /// What its image tells about its origin.
+    pub fn provenance<'a>(&'a self, build: &'a Build) -> Provenance<'a> {
+        Provenance {
+            identity: &self.identity,
+            key: &self.key,
+            job: &self.job,
+            settings: &self.settings,
+            build: build.version,
+            feature_level: build.feature_level,
+        }
+    }
+}
+
 /// Where results go and what they are compared with.
 #[derive(Clone, Debug)]
 pub struct Destination {
@@ -181,17 +195,7 @@ fn attempt(
     record.counts = counts;
 
     let start = Instant::now();
-    stamp(
-        &mut raster,
-        &Provenance {
-            identity: &planned.identity,
-            key: &planned.key,
-            job: &planned.job,
-            settings: &planned.settings,
-            build: build.version,
-            feature_level: build.feature_level,
-        },
-    );
+    stamp(&mut raster, &planned.provenance(build));
     let encoded = imagefile::encode_exr(&raster)?;
     let path = image_path(&destination.folder, &planned.job.name);
     imagefile::write_whole(&path, &encoded.bytes)?;
