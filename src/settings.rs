@@ -46,6 +46,17 @@ pub enum Filter {
     BlackmanHarris,
 }
 
+impl Filter {
+    /// The name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Tent => "tent",
+            Self::BlackmanHarris => "blackman-harris",
+        }
+    }
+}
+
 impl Default for RenderSettings {
     fn default() -> Self {
         Self {

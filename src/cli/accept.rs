@@ -7,8 +7,7 @@ use crate::{check, sweep};
 
 /// Make the results of a sweep the references of later ones.
 ///
-/// Prints, for each job, by how much the mean of its picture moves against the old reference. Without names all jobs are
-/// accepted.
+/// Prints, for each job, by how much the mean of its picture moves against the old reference. Name the jobs, or say --all.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  pipeline accept configs/roughness.toml --all\n  pipeline accept configs/roughness.toml roughness=0.30"

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use comfy_table::{CellAlignment, LineStyle, Table, presets};
 
-use super::{DIFFERENT, FAILED, Outcome, WELL, print, tell};
+use super::{DIFFERENT, FAILED, Outcome, Talk, WELL, print, tell};
 use crate::compare::strict::{self, Comparison};
 use crate::compare::{self, Limits, Options, Parts, StrictLimits, Thresholds, Verbosity};
 use crate::imagefile;
@@ -16,8 +16,8 @@ use crate::settings::{Display, ToneCurve};
 /// Compare two images.
 ///
 /// The mode `strict` fails on any value that is not finite and on any difference of size, window, parts or channel names; its
-/// limits are independent of each other. The mode `idiff` is OpenImageIO's idiff to the letter: its text and its exit codes
-/// (0 pass, 1 warning, 2 failure, 4 unreadable).
+/// limits are independent of each other. The mode `idiff` gives the text and the exit codes of OpenImageIO's idiff (0 pass, 1
+/// warning, 2 failure, 4 unreadable); its options are spelled with two dashes here, and -abs and -p are not there.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  pipeline diff a.exr b.exr\n  pipeline diff a.exr b.exr --fail 0.004 --failpercent 1\n  pipeline diff --mode idiff -a a.exr b.exr\n  pipeline diff a.exr b.exr -o difference.png --scale 10"
@@ -66,9 +66,6 @@ pub(super) struct Arguments {
     /// The largest RMS difference of the picture (mode strict).
     #[arg(long, value_name = "X", default_value_t = f32::INFINITY)]
     rms: f32,
-    /// Say only FAILURE, to stderr (mode idiff).
-    #[arg(short = 'Q', long)]
-    quiet_idiff: bool,
     /// Say everything even if nothing differs (mode idiff).
     #[arg(short, long)]
     verbose: bool,
@@ -94,7 +91,7 @@ enum Mode {
 /// `idiff`'s exit code for a file that it can't read.
 const UNREADABLE: u8 = 4;
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let (a, b) = match (imagefile::read(&arguments.a), imagefile::read(&arguments.b)) {
         (Ok(a), Ok(b)) => (a, b),
         (Err(error), _) | (_, Err(error)) if arguments.mode == Mode::Idiff => {
@@ -104,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         (Err(error), _) | (_, Err(error)) => return Err(error.into()),
     };
     if arguments.cross_check {
-        cross_check(arguments)?;
+        cross_check(arguments, talk)?;
     }
     if let Some(path) = &arguments.output {
         write_difference(path, &a, &b, arguments.scale)?;
@@ -117,7 +114,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
                 &a,
                 &b,
                 &thresholds(arguments),
-                options(arguments),
+                options(arguments, talk),
             )?;
             print(&report.stdout)?;
             if !report.stderr.is_empty() {
@@ -161,10 +158,10 @@ fn thresholds(arguments: &Arguments) -> Thresholds {
     }
 }
 
-fn options(arguments: &Arguments) -> Options {
+fn options(arguments: &Arguments, talk: Talk) -> Options {
     Options {
         parts: if arguments.all { Parts::All } else { Parts::First },
-        verbosity: match (arguments.quiet_idiff, arguments.verbose) {
+        verbosity: match (talk == Talk::Quiet, arguments.verbose) {
             (true, _) => Verbosity::Quiet,
             (false, true) => Verbosity::Verbose,
             (false, false) => Verbosity::Normal,
@@ -172,14 +169,14 @@ fn options(arguments: &Arguments) -> Options {
     }
 }
 
-fn cross_check(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+fn cross_check(arguments: &Arguments, talk: Talk) -> Result<(), Box<dyn std::error::Error>> {
     let program = compare::find_idiff(None)?;
     let checked = compare::cross_check(
         program.as_deref(),
         &arguments.a,
         &arguments.b,
         &thresholds(arguments),
-        options(arguments),
+        options(arguments, talk),
     )?;
     if checked == CrossCheck::NotInstalled {
         return Err("there is no idiff on PATH to confirm the comparison; OpenImageIO's wheel has one: pip install OpenImageIO".into());
@@ -194,7 +191,11 @@ fn write_difference(
     scale: f32,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let difference = compare::diff_image(a, b, scale)?;
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    if !matches!(extension.as_deref(), Some("png" | "exr")) {
+        return Err(format!("{}: differences are written as .exr or .png", path.display()).into());
+    }
+    if extension.as_deref() == Some("png") {
         let layer = difference.picture();
         let rgb = layer.rgb().ok_or("a difference without R, G and B can be written as EXR alone")?;
         let pixels = tone::to_srgb8(rgb, &Display { tone: ToneCurve::Srgb, exposure: 0.0 });

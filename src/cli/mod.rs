@@ -89,7 +89,7 @@ fn run(arguments: &Arguments) -> Outcome {
         Command::Render(command) => render::run(command, talk),
         Command::Sweep(command) => sweep::run(command, talk),
         Command::Accept(command) => accept::run(command, talk),
-        Command::Diff(command) => diff::run(command),
+        Command::Diff(command) => diff::run(command, talk),
         Command::Schema(command) => schema::run(command),
         Command::Completions(command) => completions::run(command),
     }

@@ -35,13 +35,13 @@ pub(super) struct Arguments {
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
     set: Vec<Override>,
     /// Samples a pixel.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16_777_216))]
     spp: Option<u32>,
     /// Columns.
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=65_536))]
     width: Option<u32>,
     /// Rows.
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=65_536))]
     height: Option<u32>,
     /// The seed.
     #[arg(long, value_name = "N")]
@@ -71,11 +71,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     exposure: f32,
     /// Trace one pixel's path again and tell where it goes, instead of rendering.
-    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, conflicts_with = "output", requires = "sample")]
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, conflicts_with = "output")]
     pixel: Option<(u32, u32)>,
     /// Which of the pixel's samples.
-    #[arg(long, value_name = "N", requires = "pixel")]
-    sample: Option<u32>,
+    #[arg(long, value_name = "N", requires = "pixel", default_value_t = 0)]
+    sample: u32,
 }
 
 /// A value of an enum by its name in files.
@@ -130,8 +130,8 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     }
     let prepared =
         Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
-    if let (Some((x, y)), Some(sample)) = (arguments.pixel, arguments.sample) {
-        return tell_path(&prepared, &planned, x, y, sample);
+    if let Some((x, y)) = arguments.pixel {
+        return tell_path(&prepared, &planned, x, y, arguments.sample);
     }
     let mut rendered = render_with_progress(&prepared, &planned, &loaded, talk)?;
     stamp(&mut rendered, &planned.provenance(&build));
@@ -195,8 +195,9 @@ fn render_with_progress(
         loaded.geometry.triangle_count(),
         counts.rays as f64 * 1e-6 / seconds.max(1e-9),
     ));
-    for skipped in prepared.skipped() {
-        talk.say(&format!("skipped: {skipped}"));
+    let skipped = prepared.skipped();
+    if !skipped.is_empty() {
+        talk.say(&format!("without work for what the scene lacks ({})", skipped.join("; ")));
     }
     if let Some(bad) = counts.first_bad_samples.first() {
         talk.say(&format!(

@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// Print the jobs' names, one a line, and do nothing.
     #[arg(long, conflicts_with = "dry_run")]
     list: bool,
-    /// Print each job with all that it sets, and do nothing.
+    /// Print each job with all that it sets, check the manifest against its scenes, and render nothing.
     #[arg(long)]
     dry_run: bool,
     /// Render again what is already there.
@@ -54,16 +54,22 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let sweep = sweep::open(&arguments.manifest)?;
+    let wanted = arguments.shard.map(|shard| shard.names(&sweep.jobs));
+    let is_wanted = |job: &&Job| wanted.as_ref().is_none_or(|names| names.contains(job.name.as_str()));
     if arguments.list {
-        let names: String = sweep.jobs.iter().map(|job| format!("{}\n", job.name)).collect();
+        let names: String =
+            sweep.jobs.iter().filter(is_wanted).map(|job| format!("{}\n", job.name)).collect();
         print(&names)?;
         return Ok(WELL);
     }
     if arguments.dry_run {
-        print(&described(&sweep))?;
-        return Ok(WELL);
+        let jobs: Vec<&Job> = sweep.jobs.iter().filter(is_wanted).collect();
+        print(&described(&sweep, &jobs))?;
+        let unreadable = sweep::check(&sweep)?;
+        unreadable.iter().for_each(|error| super::tell(&format!("error: {error}")));
+        return Ok(if unreadable.is_empty() { WELL } else { FAILED });
     }
-    let count = sweep.jobs.len();
+    let count = sweep.jobs.iter().filter(is_wanted).count();
     talk.say(&format!("{}: {count} {}", sweep.manifest.name, if count == 1 { "job" } else { "jobs" }));
     let options = Options {
         folder: arguments.output.clone(),
@@ -107,9 +113,9 @@ fn exit_code(record: &JobRecord) -> u8 {
     }
 }
 
-fn described(sweep: &Sweep) -> String {
+fn described(sweep: &Sweep, jobs: &[&Job]) -> String {
     let mut text = String::new();
-    for job in &sweep.jobs {
+    for job in jobs {
         let settings = &job.settings;
         text += &format!("{}\n  scene = {}\n", job.name, job.scene.display());
         for o in &job.overrides {
@@ -120,7 +126,7 @@ fn described(sweep: &Sweep) -> String {
             settings.spp, settings.seed, settings.max_depth
         );
     }
-    text + &format!("{} jobs into {}\n", sweep.jobs.len(), sweep.folder.display())
+    text + &format!("{} jobs into {}\n", jobs.len(), sweep.folder.display())
 }
 
 /// The width of the terminal that stdout is; none for a file or a pipe.
@@ -153,9 +159,7 @@ impl Observer for Watcher {
         }
     }
 
-    fn left_out(&mut self, _: &Job) {
-        self.progress.finish_job(true);
-    }
+    fn left_out(&mut self, _: &Job) {}
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ pub fn load(
         studio::add_studio_lighting(&mut scene);
         warnings.push(Warning::new(
             &place,
-            "no light: a studio environment is added, unless environment.* is set",
+            "no light: a studio environment is added (glowing textures do not count), unless environment.* is set",
         ));
     }
     let geometry = Arc::new(Geometry::build(&scene)?);

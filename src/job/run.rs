@@ -16,7 +16,7 @@ use crate::manifest::edit;
 use crate::output::{Provenance, stamp};
 use crate::raster::{Attribute, Layer, Raster};
 use crate::record::{Counts, CrossCheck, Job, JobRecord, Outcome, Timings, Verdict, Warning};
-use crate::render::{Control, Prepared, Rendered, render};
+use crate::render::{Control, Prepared, Rendered, image_size, render};
 use crate::scene::Scene;
 use crate::settings::RenderSettings;
 
@@ -92,16 +92,36 @@ pub fn plan(job: &Job, loaded: &LoadedScene, build: &Build) -> Result<PlannedJob
     let mut settings = job.settings.clone();
     let mut images: Vec<FileDigest> = Vec::new();
     let mut warnings: Vec<Warning> = Vec::new();
+    check_environment(job, &scene)?;
     edit::apply_all(&mut scene, &mut settings, &job.overrides, &mut |path| {
         let (image, digest, replaced) = read_environment(path)?;
         images.push(digest);
         warnings.extend(replaced);
         Ok(image)
     })?;
+    // However the size is given, it is the same image.
+    let (width, height) = image_size(&scene, &settings)?;
+    (settings.width, settings.height) = (Some(width), Some(height));
     let files: Vec<&FileDigest> = loaded.files.iter().chain(&images).collect();
     let (identity, key) =
         identify(job, &files, (&loaded.import_options, &loaded.convert_options), &settings, build);
     Ok(PlannedJob { job: job.clone(), scene: Arc::new(scene), settings, identity, key, warnings })
+}
+
+/// Whether overrides turn or dim an environment that there is: to make a white one for them would light the scene unasked.
+fn check_environment(job: &Job, scene: &Scene) -> Result<(), edit::EditError> {
+    let sets = |fields: &[&str]| {
+        job.overrides
+            .iter()
+            .find(|o| o.path.strip_prefix("environment.").is_some_and(|f| fields.contains(&f)))
+    };
+    match sets(&["intensity", "rotation"]) {
+        Some(o) if scene.environment.is_none() && sets(&["image", "color", "kind"]).is_none() => {
+            let why = "the scene has no environment; environment.image or environment.color makes one";
+            Err(edit::EditError::NotApplicable { path: o.path.clone(), why })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The record of an earlier run of the same identity whose image is still what it was; nothing otherwise.

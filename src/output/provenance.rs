@@ -23,7 +23,7 @@ pub struct Provenance<'a> {
 
 impl Provenance<'_> {
     fn filter(&self) -> String {
-        let name = format!("{:?}", self.settings.filter);
+        let name = self.settings.filter.name().to_owned();
         self.settings.filter_radius.map_or(name.clone(), |radius| format!("{name}, radius {radius}"))
     }
 }

@@ -16,7 +16,7 @@ use crate::accel::BuildError;
 pub use film::{Control, Rendered, render};
 pub use geometry::Geometry;
 pub use path::{Replay, ReplayVertex, replay};
-pub use prepare::Prepared;
+pub use prepare::{Prepared, image_size};
 
 /// Why a scene can't be rendered.
 #[derive(Debug, thiserror::Error)]

@@ -42,7 +42,7 @@ impl Prepared {
         settings: &RenderSettings,
     ) -> Result<Self, RenderError> {
         let camera = choose_camera(&scene, settings)?;
-        let (width, height) = image_size(&camera.item, settings);
+        let (width, height) = size_for(&camera.item, settings);
         check(settings, width, height)?;
         let film_camera = FilmCamera::new(&camera.name, &camera.item, width, height)?;
         let materials: Vec<_> = scene.materials.iter().map(|m| PreparedMaterial::new(&m.item)).collect();
@@ -115,8 +115,15 @@ fn choose_camera<'a>(scene: &'a Scene, settings: &RenderSettings) -> Result<&'a 
     }
 }
 
-/// The settings decide; a size that is missing comes from the camera, keeping its aspect.
-fn image_size(camera: &Camera, settings: &RenderSettings) -> (u32, u32) {
+/// Columns and rows of the image: the settings decide; a size that is missing comes from the camera, keeping its aspect.
+///
+/// # Errors
+/// If the camera is missing.
+pub fn image_size(scene: &Scene, settings: &RenderSettings) -> Result<(u32, u32), RenderError> {
+    Ok(size_for(&choose_camera(scene, settings)?.item, settings))
+}
+
+fn size_for(camera: &Camera, settings: &RenderSettings) -> (u32, u32) {
     let (default_width, default_height) = camera.size.unwrap_or(DEFAULT_SIZE);
     let aspect = match (camera.size, camera.aspect) {
         (None, Some(aspect)) if aspect.is_finite() && aspect > 0.0 => f64::from(aspect),

@@ -105,12 +105,13 @@ fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Whether anything in the scene shines: a light, an environment, or an instance whose material emits.
+/// Whether anything lights the scene: a light, an environment, or an instance whose material emits evenly. Emission by a texture is
+/// taken for a decal, such as a display: it hardly lights what it sits on.
 pub fn is_lit(scene: &Scene<Material>) -> bool {
     let shines = |light: &Light| light.intensity > 0.0 && !light.color.is_black();
     let emits = |instance: &super::Instance| {
         let material = scene.materials.get(instance.material.0 as usize);
-        material.is_some_and(|material| material.item.emits())
+        material.is_some_and(|m| m.item.emits() && m.item.emission.color.constant().is_some())
             && !scene.mesh_of(instance).triangles.is_empty()
     };
     scene.lights.iter().any(|light| shines(&light.item))

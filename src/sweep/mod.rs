@@ -11,7 +11,7 @@ use crate::record::JobRecord;
 
 pub use open::{Sweep, open};
 pub use present::Presentation;
-pub use run::{Observer, Options, Shard, Silent, run};
+pub use run::{Observer, Options, Shard, Silent, check, run};
 
 /// What a sweep came to.
 #[derive(Debug)]

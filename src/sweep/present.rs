@@ -28,12 +28,19 @@ pub(super) fn present(
     folder: &Path,
 ) -> Result<Presentation, SweepError> {
     let spec = &sweep.manifest.sheet;
+    // Those of this run, else of another shard or an earlier run; what is there of another job of this name is not shown.
+    let known: Vec<Option<JobRecord>> = sweep
+        .jobs
+        .iter()
+        .map(|job| {
+            let own = records.iter().find(|r| r.job.name == job.name);
+            own.cloned().or_else(|| job::recorded(job, folder))
+        })
+        .collect();
+    let reused = reused + known.iter().flatten().count() - records.len();
     let mut entries = Vec::with_capacity(sweep.jobs.len());
-    for job in &sweep.jobs {
-        let own = records.iter().find(|r| r.job.name == job.name);
-        // Another shard's, or an earlier run's; what is there of another job of this name is not shown.
-        let earlier = if own.is_none() { job::recorded(job, folder) } else { None };
-        let cell = match own.or(earlier.as_ref()) {
+    for (job, record) in sweep.jobs.iter().zip(&known) {
+        let cell = match record {
             Some(record) => Cell::of(record, picture(&job::image_path(folder, &job.name), spec.cell_width)?),
             None => Cell::Missing,
         };
@@ -71,9 +78,10 @@ pub(super) fn present(
         sheets.push(png);
     }
 
-    let record_files: Vec<String> = records.iter().map(|r| format!("{}.json", r.job.name)).collect();
-    let jobs: Vec<PageJob<'_>> = records
+    let record_files: Vec<String> = known.iter().flatten().map(|r| format!("{}.json", r.job.name)).collect();
+    let jobs: Vec<PageJob<'_>> = known
         .iter()
+        .flatten()
         .zip(&record_files)
         .map(|(record, file)| PageJob { record, record_file: Some(file), folder: "" })
         .collect();

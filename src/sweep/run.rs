@@ -1,6 +1,6 @@
 //! Doing the jobs of a sweep.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -39,10 +39,12 @@ pub struct Shard {
 }
 
 impl Shard {
-    fn holds(self, job: &Job) -> bool {
-        let hash = blake3::hash(job.name.as_bytes());
-        let number = hash.as_bytes().iter().take(7).fold(0, |n, byte| n << 8 | u64::from(*byte));
-        number % u64::from(self.count) == u64::from(self.index - 1)
+    /// The names of its jobs: every `count`-th in the order of the names' hashes, so that neighbours on an axis, which take alike
+    /// long, are spread over the shards.
+    pub fn names(self, jobs: &[Job]) -> BTreeSet<&str> {
+        let mut names: Vec<&str> = jobs.iter().map(|job| job.name.as_str()).collect();
+        names.sort_by_key(|name| *blake3::hash(name.as_bytes()).as_bytes());
+        names.into_iter().skip(self.index as usize - 1).step_by(self.count as usize).collect()
     }
 }
 
@@ -82,17 +84,17 @@ pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Res
     let destination = Destination { folder, references };
 
     let mut scenes = Scenes::default();
-    for path in scene_paths(&sweep.jobs) {
-        if let Ok(loaded) = scenes.get(path) {
-            manifest::check(&sweep.manifest, &loaded.scene, path)?;
-        }
-    }
+    check_with(sweep, &mut scenes)?;
 
     let mut records: Vec<(usize, JobRecord)> = Vec::new();
     let mut reused = 0;
+    let wanted = options.shard.map(|shard| shard.names(&sweep.jobs));
     for (index, job) in scene_by_scene(&sweep.jobs) {
+        if wanted.as_ref().is_some_and(|names| !names.contains(job.name.as_str())) {
+            observer.left_out(job);
+            continue;
+        }
         match run_job(job, scenes.get(&job.scene), &build, &destination, options, observer)? {
-            Turn::LeftOut => observer.left_out(job),
             Turn::Reused(record) => {
                 reused += 1;
                 observer.finished(&record, true);
@@ -114,8 +116,26 @@ pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Res
     Ok(SweepResult { records, reused, presentation })
 }
 
+/// Checks every path and value of the manifest against every scene, and tells which scenes can't be loaded.
+///
+/// # Errors
+/// If the manifest does not fit a scene that can be loaded.
+pub fn check(sweep: &Sweep) -> Result<Vec<String>, SweepError> {
+    check_with(sweep, &mut Scenes::default())
+}
+
+fn check_with(sweep: &Sweep, scenes: &mut Scenes) -> Result<Vec<String>, SweepError> {
+    let mut unreadable = Vec::new();
+    for path in scene_paths(&sweep.jobs) {
+        match scenes.get(path) {
+            Ok(loaded) => manifest::check(&sweep.manifest, &loaded.scene, path)?,
+            Err(error) => unreadable.push(error),
+        }
+    }
+    Ok(unreadable)
+}
+
 enum Turn {
-    LeftOut,
     Reused(JobRecord),
     Done(JobRecord),
 }
@@ -128,9 +148,6 @@ fn run_job(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Turn, SweepError> {
-    if options.shard.is_some_and(|shard| !shard.holds(job)) {
-        return Ok(Turn::LeftOut);
-    }
     let planned = loaded.and_then(|loaded| {
         let planned = job::plan(job, loaded, build).map_err(|error| error.to_string())?;
         Ok((planned, loaded))
@@ -252,17 +269,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_job_belongs_to_one_shard() {
-        for i in 0..100u8 {
-            let job = Job {
-                name: format!("roughness={i}"),
-                scene: PathBuf::new(),
-                overrides: Vec::new(),
-                settings: crate::settings::RenderSettings::default(),
-                coordinates: Vec::new(),
-            };
-            let holders = (1..=3).filter(|&index| Shard { index, count: 3 }.holds(&job)).count();
-            assert_eq!(holders, 1);
-        }
+    fn every_job_belongs_to_one_shard_and_shards_are_even() {
+        let job = |i: u32| Job {
+            name: format!("roughness={i}"),
+            scene: PathBuf::new(),
+            overrides: Vec::new(),
+            settings: crate::settings::RenderSettings::default(),
+            coordinates: Vec::new(),
+        };
+        let jobs: Vec<Job> = (0..11).map(job).collect();
+        let shards: Vec<_> = (1..=4).map(|index| Shard { index, count: 4 }.names(&jobs)).collect();
+        let sizes: Vec<usize> = shards.iter().map(BTreeSet::len).collect();
+        assert_eq!(sizes, [3, 3, 3, 2]);
+        assert_eq!(shards.iter().flatten().collect::<BTreeSet<_>>().len(), 11);
     }
 }

@@ -4,14 +4,15 @@ use crate::support::run;
 
 #[test]
 fn wrong_arguments_are_64() {
-    let wrong: [&[&str]; 11] = [
+    let wrong: [&[&str]; 12] = [
         &[],
         &["rendr"],
         &["sweep"],
         &["sweep", "a.toml", "--shard", "3/2"],
         &["sweep", "a.toml", "--list", "--dry-run"],
         &["render", "a.glb"],
-        &["render", "a.glb", "--pixel", "1,2"],
+        &["render", "a.glb", "--sample", "2"],
+        &["render", "a.glb", "-o", "a.exr", "--spp", "0"],
         &["render", "a.glb", "-o", "a.exr", "--set", "camera.fov"],
         &["render", "a.glb", "-o", "a.exr", "--spp", "many"],
         &["accept", "a.toml"],

@@ -80,7 +80,7 @@ fn idiff_mode_has_idiff_s_codes_and_text() {
     assert_eq!(lines.last(), Some(&"FAILURE"));
     diff(&desk, "--mode idiff --failpercent 50 a.exr b.exr").ends_with(1).says("WARNING\n");
     diff(&desk, "--mode idiff --failpercent 50 --warnpercent 50 a.exr b.exr").ends_with(0).says("PASS\n");
-    let quiet = diff(&desk, "--mode idiff -Q a.exr b.exr").ends_with(2);
+    let quiet = diff(&desk, "--mode idiff -q a.exr b.exr").ends_with(2);
     assert_eq!((quiet.stdout.as_str(), quiet.stderr.as_str()), ("", "FAILURE\n"));
     diff(&desk, "--mode idiff a.exr none.exr").ends_with(4).tells("idiff ERROR: ").tells("none.exr");
     diff(&desk, "--mode idiff text.exr a.exr").ends_with(4).tells("text.exr");

@@ -121,8 +121,9 @@ fn sizes_and_samples_out_of_range_are_told() {
     let desk = desk();
     let spheres = spheres();
     let scene = spheres.to_str().unwrap();
-    for wrong in [["--spp", "0"], ["--width", "0"], ["--height", "4000000000"], ["--replicates", "0"]] {
-        let run = desk.run(["render", scene, "-o", "a.exr"].iter().chain(&wrong)).ends_with(2);
+    let wrong = [["--spp", "0"], ["--width", "0"], ["--height", "4000000000"]];
+    for (wrong, code) in wrong.map(|w| (w, 64)).into_iter().chain([(["--replicates", "0"], 2)]) {
+        let run = desk.run(["render", scene, "-o", "a.exr"].iter().chain(&wrong)).ends_with(code);
         run.tells("error: ").tells_not("panicked");
     }
     let huge = ["--width", "65536", "--height", "65536", "--spp", "1"];
@@ -196,4 +197,15 @@ fn an_output_that_cannot_be_written_is_told_and_nothing_is_left() {
     std::fs::create_dir(desk.path("folder.exr")).unwrap();
     render(&desk, spheres(), &["-o", "folder.exr"]).ends_with(2).tells("folder.exr");
     assert_eq!(desk.names("."), ["folder.exr", "sweep.toml"]);
+}
+
+/// To make a white environment for it would light the scene unasked.
+#[test]
+fn turning_an_environment_that_is_not_there_is_refused() {
+    let desk = desk();
+    for field in ["rotation=30", "intensity=2"] {
+        let set = format!("environment.{field}");
+        render(&desk, spheres(), &["-o", "a.exr", "--set", &set]).ends_with(2).tells("has no environment");
+    }
+    assert_eq!(desk.names("."), ["sweep.toml"]);
 }
