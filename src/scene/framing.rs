@@ -13,7 +13,7 @@ const MARGIN: f64 = 1.08;
 /// The distance to a scene without extent, in metres.
 const DISTANCE_TO_A_POINT: f64 = 1.0;
 
-/// A three-quarter view in which the box around all instances just fits, in pictures that are at least as wide as high. A scene
+/// A three-quarter view in which all vertices just fit, in pictures that are at least as wide as high. A scene
 /// without vertices, or with some at infinity, is looked at as if it were a point at the origin.
 pub fn frame<M>(scene: &Scene<M>) -> Camera {
     let bounds = scene.bounds().filter(|(low, high)| low.is_finite() && high.is_finite());
@@ -25,11 +25,13 @@ pub fn frame<M>(scene: &Scene<M>) -> Camera {
     let axes = camera.world_from_camera.matrix3;
     let [right, up, back] = [axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| Vec3::from(axis).as_dvec3());
     let tan_half = libm::tan(f64::from(FOV_Y) / 2.0);
-    // A corner at (x, y, z) in camera axes is seen from distance d if max(|x|, |y|) ≤ (d - z)·tan(fov/2).
-    let half = (high - low) / 2.0;
-    let needed = (0..8_u32).map(|corner| {
-        let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        let offset = half * DVec3::new(sign(0), sign(1), sign(2));
+    // A vertex at (x, y, z) in camera axes is seen from distance d if max(|x|, |y|) ≤ (d - z)·tan(fov/2).
+    let vertices = scene.instances.iter().filter(|_| bounds.is_some()).flat_map(|instance| {
+        let positions = &scene.mesh_of(instance).positions;
+        positions.iter().map(|&p| instance.world_from_object.transform_point3(p).as_dvec3())
+    });
+    let needed = vertices.map(|vertex| {
+        let offset = vertex - centre;
         offset.dot(back) + offset.dot(right).abs().max(offset.dot(up).abs()) / tan_half
     });
     let fitting = MARGIN * needed.fold(0.0, f64::max);
@@ -65,12 +67,15 @@ mod tests {
 
     /// The largest |x/z| or |y/z| of a corner over tan(fov/2): up to 1 it is inside a square picture.
     fn largest_extent(low: Vec3, high: Vec3) -> f32 {
-        let camera = frame(&scene(vec![low, high]));
+        let corner = |corner: u32| {
+            let pick = |bit: u32, a: f32, b: f32| if corner >> bit & 1 == 1 { a } else { b };
+            Vec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z))
+        };
+        let camera = frame(&scene((0..8).map(corner).collect()));
         assert!(camera.world_from_camera.is_finite());
         let camera_from_world = camera.world_from_camera.inverse();
-        let extent = |corner: u32| {
-            let pick = |bit: u32, a: f32, b: f32| if corner >> bit & 1 == 1 { a } else { b };
-            let p = Vec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z));
+        let extent = |i: u32| {
+            let p = corner(i);
             let p = camera_from_world.transform_point3(p);
             assert!(p.z < 0.0, "behind the camera: {p}");
             p.x.abs().max(p.y.abs()) / -p.z / libm::tanf(FOV_Y / 2.0)
