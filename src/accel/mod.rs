@@ -116,19 +116,10 @@ impl Bvh {
     #[inline]
     pub fn closest_where(&self, ray: &Ray, mut counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
-        let mut ray = *ray;
-        let sheared = ShearedRay::new(&ray);
-        self.traverse(&mut ray, |ray, first, count| {
-            for i in first..first + count {
-                if let Some((t, barycentric)) = self.triangles[i].intersect(&sheared, ray.t_max)
-                    && ray.source != Some(self.ids[i])
-                {
-                    let hit = Hit { t, triangle: self.ids[i], barycentric };
-                    if counts(&hit) {
-                        ray.t_max = t;
-                        nearest = Some(hit);
-                    }
-                }
+        self.each_hit(ray, |ray, hit| {
+            if counts(&hit) {
+                ray.t_max = hit.t;
+                nearest = Some(hit);
             }
             ControlFlow::Continue(())
         });
@@ -142,6 +133,12 @@ impl Bvh {
 
     /// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
     pub fn visit(&self, ray: &Ray, mut visitor: impl FnMut(Hit) -> ControlFlow<()>) -> bool {
+        self.each_hit(ray, |_, hit| visitor(hit))
+    }
+
+    /// Calls `found` with each hit nearer than the ray's end, which it may bring nearer; tells whether it broke off.
+    #[inline(always)]
+    fn each_hit(&self, ray: &Ray, mut found: impl FnMut(&mut Ray, Hit) -> ControlFlow<()>) -> bool {
         let mut ray = *ray;
         let sheared = ShearedRay::new(&ray);
         self.traverse(&mut ray, |ray, first, count| {
@@ -149,7 +146,7 @@ impl Bvh {
                 if let Some((t, barycentric)) = self.triangles[i].intersect(&sheared, ray.t_max)
                     && ray.source != Some(self.ids[i])
                 {
-                    visitor(Hit { t, triangle: self.ids[i], barycentric })?;
+                    found(ray, Hit { t, triangle: self.ids[i], barycentric })?;
                 }
             }
             ControlFlow::Continue(())
