@@ -10,8 +10,10 @@ use crate::math::{Real, V3};
 /// The part of a BSDF that a sampled direction was made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lobe {
-    /// Diffuse reflection, subsurface and sheen.
+    /// Diffuse reflection with subsurface; directions are sampled for it and the sheen together.
     Diffuse,
+    /// The grazing component for cloth; its directions count as [`Self::Diffuse`].
+    Sheen,
     /// The base layer's highlight.
     Specular,
     /// The coat's highlight.
@@ -25,6 +27,19 @@ pub enum Lobe {
 }
 
 impl Lobe {
+    /// The name for people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Diffuse => "diffuse",
+            Self::Sheen => "sheen",
+            Self::Specular => "specular",
+            Self::Clearcoat => "clearcoat",
+            Self::Mirror => "mirror",
+            Self::DielectricReflection => "delta reflection",
+            Self::DielectricTransmission => "delta transmission",
+        }
+    }
+
     /// The lobe holds single directions: its pdf is a discrete probability, and no other sampler can find them.
     #[inline]
     pub const fn is_delta(self) -> bool {
@@ -134,6 +149,25 @@ impl<F: Real> Bsdf<F> {
             Kind::Disney(_) | Kind::Lambert { .. } => None,
             Kind::Mirror => sample_mirror(wo),
             Kind::Dielectric(dielectric) => dielectric.sample(wo, u_lobe),
+        }
+    }
+
+    /// The lobes that are there, for looking into a material.
+    pub fn lobes(&self) -> Vec<Lobe> {
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.lobes(),
+            Kind::Lambert { .. } => vec![Lobe::Diffuse],
+            Kind::Mirror => vec![Lobe::Mirror],
+            Kind::Dielectric(_) => vec![Lobe::DielectricReflection, Lobe::DielectricTransmission],
+        }
+    }
+
+    /// One lobe's part of [`Self::eval`], black for delta lobes and lobes that aren't there; the parts sum to the whole.
+    pub fn eval_lobe(&self, lobe: Lobe, wo: V3<F>, wi: V3<F>) -> Rgb<F> {
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.eval_lobe(lobe, wo, wi),
+            Kind::Lambert { .. } if lobe == Lobe::Diffuse => self.eval(wo, wi),
+            Kind::Lambert { .. } | Kind::Mirror | Kind::Dielectric(_) => Rgb::BLACK,
         }
     }
 

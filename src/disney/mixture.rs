@@ -93,6 +93,30 @@ impl<F: Real> Mixture<F> {
         (f, pdf)
     }
 
+    /// The lobes that are there.
+    pub(super) fn lobes(&self) -> Vec<Lobe> {
+        let there = [
+            (Lobe::Diffuse, self.diffuse.is_some()),
+            (Lobe::Sheen, self.sheen.is_some()),
+            (Lobe::Specular, true),
+            (Lobe::Clearcoat, self.clearcoat.is_some()),
+        ];
+        there.into_iter().filter_map(|(lobe, there)| there.then_some(lobe)).collect()
+    }
+
+    /// One lobe's part of the BRDF.
+    pub(super) fn eval_lobe(&self, lobe: Lobe, wo: V3<F>, wi: V3<F>) -> Rgb<F> {
+        let Some(pair) = Pair::new(wo, wi) else { return Rgb::BLACK };
+        let part = match lobe {
+            Lobe::Diffuse => self.diffuse.as_ref().map(|diffuse| diffuse.eval(&pair)),
+            Lobe::Sheen => self.sheen.as_ref().map(|sheen| sheen.eval(&pair)),
+            Lobe::Specular => Some(self.specular.eval_with_pdf(&pair).0),
+            Lobe::Clearcoat => self.clearcoat.as_ref().map(|coat| Rgb::grey(coat.eval_with_pdf(&pair).0)),
+            Lobe::Mirror | Lobe::DielectricReflection | Lobe::DielectricTransmission => None,
+        };
+        part.unwrap_or(Rgb::BLACK)
+    }
+
     /// A direction by one of the samplers, chosen by `u_lobe`. `None` if it comes out below the horizon.
     #[inline]
     pub(super) fn sample(&self, wo: V3<F>, u_lobe: F, u: [F; 2]) -> Option<BsdfSample<F>> {
