@@ -52,7 +52,7 @@ fn a_mirror_in_an_even_environment_disappears() {
 /// furnace, however often light is reflected inside.
 #[test]
 fn lossless_glass_in_an_even_environment_disappears() {
-    let glass = Material { model: Model::Dielectric, ior: 1.5, ..Material::default() };
+    let glass = Material { model: Model::Dielectric, ..Material::default() };
     let mut world = scene(
         vec![(sphere(1.0, Vec3::ZERO, 24), glass)],
         Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, 0.8),

@@ -45,6 +45,7 @@ impl Row<'_> {
             sheen_tint: self.f32("sheen_tint"),
             clearcoat: self.f32("clearcoat"),
             clearcoat_gloss: self.f32("clearcoat_gloss"),
+            ..Params::default()
         }
     }
 

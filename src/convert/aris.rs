@@ -24,7 +24,7 @@ pub(super) fn convert(
         ArisBrdf::Disney(disney) => {
             set_disney(&mut out, disney);
             note("color", Quality::Exact, "");
-            for (parameter, value) in Parameter::ALL.into_iter().zip(disney.scalars) {
+            for (parameter, value) in Parameter::BURLEY_2012.into_iter().zip(disney.scalars) {
                 if value.is_some() {
                     note(ArisDisney::key(parameter), Quality::Exact, "");
                 }
@@ -41,7 +41,7 @@ pub(super) fn convert(
         }
         ArisBrdf::Dielectric { ext_ior, int_ior } => {
             out.model = Model::Dielectric;
-            out.ior = int_ior / ext_ior;
+            *out.scalar_mut(Parameter::Ior) = Param::Constant(int_ior / ext_ior);
             // Light passes from either side.
             out.sides = Sides::Both;
             note("ext_ior", Quality::Exact, "");
@@ -83,7 +83,7 @@ fn set_disney(out: &mut Material, disney: &ArisDisney) {
     out.model = Model::Disney;
     out.masking = Masking::Remapped;
     out.base_color = Param::Constant(disney.color);
-    for (parameter, value) in Parameter::ALL.into_iter().zip(disney.scalars) {
+    for (parameter, value) in Parameter::BURLEY_2012.into_iter().zip(disney.scalars) {
         *out.scalar_mut(parameter) = Param::Constant(value.unwrap_or(parameter.default()));
     }
 }
@@ -106,7 +106,7 @@ mod tests {
             converted(ArisBrdf::Disney(ArisDisney { color: Rgb::grey(0.3), scalars }), None);
         assert_eq!((material.masking, material.frame), (Masking::Remapped, ShadingFrame::Nori));
         assert_eq!((material.model, material.sides), (Model::Disney, Sides::Front));
-        for (i, parameter) in Parameter::ALL.into_iter().enumerate() {
+        for (i, parameter) in Parameter::BURLEY_2012.into_iter().enumerate() {
             let expected = if i == 3 { parameter.default() } else { 0.05 * i as f32 };
             assert_eq!(material.scalar(parameter).constant(), Some(expected), "{parameter:?}");
         }
@@ -126,7 +126,8 @@ mod tests {
     fn delta_materials_keep_their_index() {
         assert_eq!(converted(ArisBrdf::Mirror, None).0.model, Model::Mirror);
         let (glass, _) = converted(ArisBrdf::Dielectric { ext_ior: 1.25, int_ior: 1.5 }, None);
-        assert_eq!((glass.model, glass.ior, glass.sides), (Model::Dielectric, 1.2, Sides::Both));
+        assert_eq!((glass.model, glass.sides), (Model::Dielectric, Sides::Both));
+        assert_eq!(glass.scalar(Parameter::Ior).constant(), Some(1.2));
     }
 
     #[test]

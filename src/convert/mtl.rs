@@ -372,9 +372,9 @@ impl Conversion<'_> {
         if self.out.model == Model::Dielectric {
             let ni = self.source.ni.unwrap_or(1.5);
             if ni > 0.0 {
-                self.out.ior = ni;
+                self.set(Parameter::Ior, ni);
             } else {
-                self.warn(format!("Ni is {ni}, but must be above 0; {} is taken", self.out.ior));
+                self.warn(format!("Ni is {ni}, but must be above 0; {} is taken", Parameter::Ior.default()));
             }
             if self.source.ni.is_some() {
                 self.note("Ni", Quality::Exact, "");

@@ -18,12 +18,18 @@ pub enum Lobe {
     Specular,
     /// The coat's highlight.
     Clearcoat,
+    /// Transmission by a rough interface or sheet.
+    Transmission,
+    /// Light that passes diffusely.
+    DiffuseTransmission,
     /// A perfect mirror.
     Mirror,
     /// Reflection by a smooth dielectric.
     DielectricReflection,
     /// Refraction by a smooth dielectric.
     DielectricTransmission,
+    /// Through a clear thin sheet, not bent: shadow rays pass it too.
+    StraightTransmission,
 }
 
 impl Lobe {
@@ -34,16 +40,37 @@ impl Lobe {
             Self::Sheen => "sheen",
             Self::Specular => "specular",
             Self::Clearcoat => "clearcoat",
+            Self::Transmission => "transmission",
+            Self::DiffuseTransmission => "diffuse transmission",
             Self::Mirror => "mirror",
             Self::DielectricReflection => "delta reflection",
             Self::DielectricTransmission => "delta transmission",
+            Self::StraightTransmission => "straight transmission",
         }
     }
 
     /// The lobe holds single directions: its pdf is a discrete probability, and no other sampler can find them.
     #[inline]
     pub const fn is_delta(self) -> bool {
-        matches!(self, Self::Mirror | Self::DielectricReflection | Self::DielectricTransmission)
+        matches!(
+            self,
+            Self::Mirror
+                | Self::DielectricReflection
+                | Self::DielectricTransmission
+                | Self::StraightTransmission
+        )
+    }
+
+    /// Light leaves on the other side than the viewer's.
+    #[inline]
+    pub const fn is_transmission(self) -> bool {
+        matches!(
+            self,
+            Self::Transmission
+                | Self::DiffuseTransmission
+                | Self::DielectricTransmission
+                | Self::StraightTransmission
+        )
     }
 }
 
@@ -60,20 +87,20 @@ pub struct BsdfSample<F = f32> {
     pub pdf: F,
     /// The lobe that the direction was made for.
     pub lobe: Lobe,
-    /// The refractive index on `wi`'s side over the one on `wo`'s; 1 for reflection.
+    /// The refractive index on `wi`'s side over the one on `wo`'s; 1 for reflection, and where light isn't bent.
     pub eta: F,
 }
 
 /// The sample of a lobe that isn't a delta, `None` where no direction was found: its density is 0 then.
 #[inline]
-pub(super) fn reflection<F: Real>(f: Rgb<F>, wi: V3<F>, pdf: F, lobe: Lobe) -> Option<BsdfSample<F>> {
-    (pdf > F::ZERO && pdf.is_finite()).then_some(BsdfSample { f, wi, pdf, lobe, eta: F::ONE })
+pub(super) fn scattered<F: Real>(sample: BsdfSample<F>) -> Option<BsdfSample<F>> {
+    (sample.pdf > F::ZERO && sample.pdf.is_finite()).then_some(sample)
 }
 
 /// How a surface scatters light at one point, in the local frame whose z is the shading normal.
 ///
-/// Directions are unit vectors that point away from the surface. Only the dielectric scatters below the horizon; all else is black
-/// from behind, so a two-sided material turns the frame first.
+/// Directions are unit vectors that point away from the surface. z < 0 is the inside of an interface or the far side of a thin sheet.
+/// What doesn't transmit is black from behind, and so is a thin sheet: a two-sided material turns the frame first.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<F = f32> {
     kind: Kind<F>,
@@ -88,7 +115,7 @@ enum Kind<F> {
 }
 
 impl<F: Real> Bsdf<F> {
-    /// All of Burley 2012. Parameters are taken to be in range; [`super::Parameter::check`] tells.
+    /// All of Burley 2012, with the transmission of Burley 2015. Parameters are taken to be in range; [`super::Parameter::check`] tells.
     pub fn disney(params: &Params<F>, masking: Masking, diffuse: DiffuseModel) -> Self {
         Self { kind: Kind::Disney(Mixture::new(params, masking, diffuse)) }
     }
@@ -108,15 +135,16 @@ impl<F: Real> Bsdf<F> {
         Self { kind: Kind::Dielectric(Dielectric { ior }) }
     }
 
-    /// The BSDF without the cosine. Black unless both directions are above the horizon, and for delta lobes.
+    /// The BSDF without the cosine and without its delta lobes.
     #[inline]
     pub fn eval(&self, wo: V3<F>, wi: V3<F>) -> Rgb<F> {
         self.eval_with_pdf(wo, wi).0
     }
 
-    /// The density of [`Self::sample`] per unit solid angle of `wi`, 0 for delta lobes.
+    /// The density of [`Self::sample`] per unit solid angle of `wi`, without its delta lobes.
     ///
-    /// Its integral is 1 less the samples that come out below the horizon, for which `sample` returns `None`.
+    /// Its integral is 1 less the probability of delta lobes and of samples that come out on the wrong side of the horizon, for which
+    /// `sample` returns `None`.
     #[inline]
     pub fn pdf(&self, wo: V3<F>, wi: V3<F>) -> F {
         self.eval_with_pdf(wo, wi).1
@@ -137,16 +165,17 @@ impl<F: Real> Bsdf<F> {
     /// A direction to the light for a path that comes along `wo`, from numbers in [0, 1): `u_lobe` chooses the lobe and `u` the
     /// direction within it.
     ///
-    /// `None` where the path ends: `wo` is below the horizon, or the direction came out below.
+    /// `None` where the path ends: nothing is scattered to `wo`'s side, or the direction came out on the wrong one.
     #[inline]
     pub fn sample(&self, wo: V3<F>, u_lobe: F, u: [F; 2]) -> Option<BsdfSample<F>> {
         match &self.kind {
-            Kind::Disney(mixture) if wo.z > F::ZERO => mixture.sample(wo, u_lobe, u),
+            Kind::Disney(mixture) => mixture.sample(wo, u_lobe, u),
             Kind::Lambert { base_color } if wo.z > F::ZERO => {
                 let wi = cosine_hemisphere(u);
-                reflection(*base_color * F::FRAC_1_PI, wi, cosine_hemisphere_pdf(wi.z), Lobe::Diffuse)
+                let (f, pdf) = (*base_color * F::FRAC_1_PI, cosine_hemisphere_pdf(wi.z));
+                scattered(BsdfSample { f, wi, pdf, lobe: Lobe::Diffuse, eta: F::ONE })
             }
-            Kind::Disney(_) | Kind::Lambert { .. } => None,
+            Kind::Lambert { .. } => None,
             Kind::Mirror => sample_mirror(wo),
             Kind::Dielectric(dielectric) => dielectric.sample(wo, u_lobe),
         }
@@ -174,7 +203,20 @@ impl<F: Real> Bsdf<F> {
     /// Nothing but delta lobes: next-event estimation can't find light here.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        matches!(self.kind, Kind::Mirror | Kind::Dielectric(_))
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.is_delta(),
+            Kind::Lambert { .. } => false,
+            Kind::Mirror | Kind::Dielectric(_) => true,
+        }
+    }
+
+    /// What a clear thin sheet lets pass of light that goes straight through, seen from `wo`; none for any other surface.
+    #[inline]
+    pub fn straight_transmittance(&self, wo: V3<F>) -> Option<Rgb<F>> {
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.straight_transmittance(wo),
+            Kind::Lambert { .. } | Kind::Mirror | Kind::Dielectric(_) => None,
+        }
     }
 
     /// What an albedo layer shows: the base colour, or white for mirror and dielectric.

@@ -9,7 +9,7 @@ use crate::math::{Real, V3};
 #[inline]
 pub(super) fn sample_mirror<F: Real>(wo: V3<F>) -> Option<BsdfSample<F>> {
     let wi = V3::new(-wo.x, -wo.y, wo.z);
-    if wo.z > F::ZERO { delta(wi, F::ONE, F::ONE, Lobe::Mirror, F::ONE) } else { None }
+    if wo.z > F::ZERO { delta(wi, Rgb::WHITE, F::ONE, Lobe::Mirror, F::ONE) } else { None }
 }
 
 /// A smooth dielectric.
@@ -30,19 +30,25 @@ impl<F: Real> Dielectric<F> {
         let split = dielectric_split(wo.z.abs(), eta);
         if u_lobe < split.reflectance {
             let wi = V3::new(-wo.x, -wo.y, wo.z);
-            delta(wi, split.reflectance, split.reflectance, Lobe::DielectricReflection, F::ONE)
+            delta(wi, Rgb::grey(split.reflectance), split.reflectance, Lobe::DielectricReflection, F::ONE)
         } else {
-            let wi = V3::new(-wo.x / eta, -wo.y / eta, (-split.cos_t).copysign(-wo.z));
-            let transmittance = F::ONE - split.reflectance;
-            delta(wi, transmittance / eta.sqr(), transmittance, Lobe::DielectricTransmission, eta)
+            let factor = Rgb::grey(split.transmittance / eta.sqr());
+            let wi = refracted(wo, split.cos_t, eta);
+            delta(wi, factor, split.transmittance, Lobe::DielectricTransmission, eta)
         }
     }
+}
+
+/// `wo` refracted by the plane z = 0 at an angle of the cosine `cos_t`, into a medium of `eta` times the refractive index.
+#[inline]
+pub(super) fn refracted<F: Real>(wo: V3<F>, cos_t: F, eta: F) -> V3<F> {
+    V3::new(-wo.x / eta, -wo.y / eta, (-cos_t).copysign(-wo.z))
 }
 
 /// The sample of a delta lobe that passes on `factor` with probability `pdf`: f is `factor`/|cos θi|. `None` where cos θi is so small that
 /// f is not finite, or where the lobe has probability 0.
 #[inline]
-fn delta<F: Real>(wi: V3<F>, factor: F, pdf: F, lobe: Lobe, eta: F) -> Option<BsdfSample<F>> {
+pub(super) fn delta<F: Real>(wi: V3<F>, factor: Rgb<F>, pdf: F, lobe: Lobe, eta: F) -> Option<BsdfSample<F>> {
     let f = factor / wi.z.abs();
-    (pdf > F::ZERO && f.is_finite()).then(|| BsdfSample { f: Rgb::grey(f), wi, pdf, lobe, eta })
+    (pdf > F::ZERO && f.is_finite()).then_some(BsdfSample { f, wi, pdf, lobe, eta })
 }

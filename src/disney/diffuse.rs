@@ -3,16 +3,18 @@
 use super::fresnel::schlick_weight;
 use super::pair::Pair;
 use super::parameter::{DiffuseModel, Params};
+use super::specular::Schlick;
 use crate::color::Rgb;
 use crate::math::{Real, V3};
 
-/// The base colour's diffuse reflection, scaled by 1 - metallic.
+/// The base colour's diffuse reflection: what metal, interface and diffuse transmission leave of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Diffuse<F> {
-    /// base_color·(1 - metallic)/π.
+    /// base_color·(1 - metallic)(1 - spec_trans)(1 - diff_trans/2)/π.
     color: Rgb<F>,
-    /// F0 of the specular lobe, for [`DiffuseModel::LambertFresnel`].
+    /// F0 and F90 of the base's highlight, for [`DiffuseModel::LambertFresnel`].
     f0: Rgb<F>,
+    f90: F,
     roughness: F,
     subsurface: F,
     model: DiffuseModel,
@@ -24,9 +26,11 @@ pub(super) struct Diffuse<F> {
 }
 
 impl<F: Real> Diffuse<F> {
-    /// `None` where the lobe reflects nothing.
-    pub(super) fn new(params: &Params<F>, f0: Rgb<F>, model: DiffuseModel) -> Option<Self> {
-        let reflectance = params.base_color * (F::ONE - params.metallic);
+    /// `None` where the lobe reflects nothing. `highlight` is the base's.
+    pub(super) fn new(params: &Params<F>, highlight: Schlick<F>, model: DiffuseModel) -> Option<Self> {
+        let Schlick { f0, f90 } = highlight;
+        let kept = params.diffuse_part() * (F::ONE - F::of(0.5) * params.diff_trans);
+        let reflectance = params.base_color * kept;
         let diffuse_part = match model {
             DiffuseModel::Burley | DiffuseModel::Lambert => reflectance,
             DiffuseModel::LambertFresnel => reflectance * f0.map(|f0| (F::ONE - f0).max(F::ZERO)),
@@ -44,6 +48,7 @@ impl<F: Real> Diffuse<F> {
         Some(Self {
             color: reflectance * F::FRAC_1_PI,
             f0,
+            f90,
             roughness: params.roughness,
             subsurface: params.subsurface,
             model,
@@ -94,7 +99,9 @@ impl<F: Real> Diffuse<F> {
         match self.model {
             DiffuseModel::Burley | DiffuseModel::Lambert => color,
             DiffuseModel::LambertFresnel => {
-                let left = self.f0.map(|f0| (F::ONE - f0) * (F::ONE - pair.schlick));
+                // 1 - lerp(F0, F90, weight).
+                let at_edge = (F::ONE - self.f90) * pair.schlick;
+                let left = self.f0.map(|f0| (F::ONE - f0) * (F::ONE - pair.schlick) + at_edge);
                 color * left.map(|f| f.max(F::ZERO))
             }
         }

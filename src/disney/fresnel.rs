@@ -13,8 +13,15 @@ pub fn schlick_weight<F: Real>(cos_theta: F) -> F {
 pub(super) struct DielectricSplit<F> {
     /// The reflected part in [0, 1], for unpolarised light.
     pub(super) reflectance: F,
+    /// 1 - reflectance, without cancellation where nearly all light is reflected.
+    pub(super) transmittance: F,
     /// The cosine of the refracted angle, 0 where all light is reflected.
     pub(super) cos_t: F,
+}
+
+impl<F: Real> DielectricSplit<F> {
+    /// Where there is no interface: nothing reflected by it and nothing passed on.
+    pub(super) const OPAQUE: Self = Self { reflectance: F::ZERO, transmittance: F::ZERO, cos_t: F::ZERO };
 }
 
 /// The split at an interface whose far side has `eta` > 0 times the near side's refractive index, by Fresnel's equations.
@@ -23,13 +30,22 @@ pub(super) fn dielectric_split<F: Real>(cos_i: F, eta: F) -> DielectricSplit<F> 
     // eta² cos² θt = eta² - sin² θi, without the cancellation near eta = 1 and at grazing angles.
     let scaled_cos2_t = (eta - F::ONE) * (eta + F::ONE) + cos_i.sqr();
     if scaled_cos2_t <= F::ZERO {
-        return DielectricSplit { reflectance: F::ONE, cos_t: F::ZERO };
+        return DielectricSplit { reflectance: F::ONE, transmittance: F::ZERO, cos_t: F::ZERO };
     }
-    let cos_t = scaled_cos2_t.sqrt() / eta;
-    let r_parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    let r_perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    split_given_both_cosines(cos_i, scaled_cos2_t.sqrt() / eta, eta)
+}
+
+/// The same where the refracted angle's cosine is known as well.
+#[inline]
+pub(super) fn split_given_both_cosines<F: Real>(cos_i: F, cos_t: F, eta: F) -> DielectricSplit<F> {
+    let (parallel, perpendicular) = (eta * cos_i + cos_t, cos_i + eta * cos_t);
+    let r_parallel = (eta * cos_i - cos_t) / parallel;
+    let r_perpendicular = (cos_i - eta * cos_t) / perpendicular;
     let reflectance = F::of(0.5) * (r_parallel.sqr() + r_perpendicular.sqr());
-    DielectricSplit { reflectance: reflectance.min(F::ONE), cos_t }
+    // 1 - ((a - b)/(a + b))² = 4ab/(a + b)².
+    let product = F::of(2.0) * eta * cos_i * cos_t;
+    let transmittance = product / parallel.sqr() + product / perpendicular.sqr();
+    DielectricSplit { reflectance: reflectance.min(F::ONE), transmittance: transmittance.min(F::ONE), cos_t }
 }
 
 /// The reflectance of a smooth dielectric for unpolarised light, 1 under total internal reflection.
@@ -64,6 +80,19 @@ mod tests {
         // Only the s-polarised half remains: ½((1 - η²)/(1 + η²))².
         let expected = 0.5 * ((1.0 - eta * eta) / (1.0 + eta * eta)).sqr();
         assert!((fresnel_dielectric(cos_i, eta) - expected).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_two_parts_sum_to_one_and_each_is_accurate() {
+        for cos_i in [1.0f32, 0.3, 1e-3, 1e-6] {
+            for eta in [0.2f32, 1.0 / 1.5, 1.0003, 1.5, 8.0] {
+                let single = dielectric_split(cos_i, eta);
+                let double = dielectric_split(f64::from(cos_i), f64::from(eta));
+                assert!((single.reflectance + single.transmittance - 1.0).abs() < 1e-6);
+                let error = (f64::from(single.transmittance) - double.transmittance).abs();
+                assert!(error <= 3e-6 * double.transmittance, "{cos_i} {eta}: {single:?} {double:?}");
+            }
+        }
     }
 
     #[test]

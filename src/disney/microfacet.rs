@@ -49,9 +49,14 @@ impl<F: Real> Gtr2<F> {
     /// Normals per unit solid angle around the half vector: 1/(π ax ay (hx²/ax² + hy²/ay² + hz²)²).
     #[inline]
     pub(super) fn density(&self, pair: &Pair<F>) -> F {
-        let h = pair.sum;
+        self.density_at(pair.sum, pair.sum2)
+    }
+
+    /// The same around a vector `h` of any length, `h2` being its square.
+    #[inline]
+    pub(super) fn density_at(&self, h: V3<F>, h2: F) -> F {
         let stretched = h.x.sqr() * self.inv_ax2 + h.y.sqr() * self.inv_ay2 + h.z.sqr();
-        self.peak * (pair.sum2 / stretched).sqr()
+        self.peak * (h2 / stretched).sqr()
     }
 
     /// A normal visible from `wo` (wo.z > 0), not normalised, by spherical caps (Dupuy and Benyoub 2023, listing 3). The density is

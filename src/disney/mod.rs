@@ -18,6 +18,7 @@ mod sheen;
 mod specular;
 #[cfg(test)]
 mod tests;
+mod transmission;
 
 pub use bsdf::{Bsdf, BsdfSample, Lobe};
 pub use fresnel::{fresnel_dielectric, schlick_weight};

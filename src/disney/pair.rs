@@ -16,7 +16,9 @@ pub(super) struct Pair<F> {
     pub(super) sum: V3<F>,
     /// |wo + wi|² = 4 cos² θd.
     pub(super) sum2: F,
-    /// cos² θd, θd being the angle between either direction and the half vector.
+    /// cos θd, θd being the angle between either direction and the half vector.
+    pub(super) cos_d: F,
+    /// cos² θd.
     pub(super) cos2_d: F,
     /// Schlick's weight (1 - cos θd)⁵.
     pub(super) schlick: F,
@@ -42,6 +44,6 @@ impl<F: Real> Pair<F> {
         } else {
             F::ONE - cos_d.max(F::ZERO)
         };
-        Some(Self { wo, wi, sum, sum2, cos2_d: cos_d.sqr(), schlick: one_minus_cos_d.pow5() })
+        Some(Self { wo, wi, sum, sum2, cos_d, cos2_d: cos_d.sqr(), schlick: one_minus_cos_d.pow5() })
     }
 }

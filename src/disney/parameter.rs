@@ -9,7 +9,7 @@ use crate::math::Real;
 /// The name of the one parameter that is a colour.
 pub const BASE_COLOR: &str = "base_color";
 
-/// A scalar parameter of Burley 2012.
+/// A scalar parameter: the ten of Burley 2012, and what later scenes need beyond them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Parameter {
     /// Blends the diffuse shape towards a flattened, Hanrahan-Krueger-like one.
@@ -32,11 +32,40 @@ pub enum Parameter {
     Clearcoat,
     /// That lobe's gloss: 0 is satin, 1 gloss.
     ClearcoatGloss,
+    /// The part of the base that is a rough dielectric interface instead of diffuse (Burley 2015).
+    SpecTrans,
+    /// That interface's refractive index, inside over outside.
+    Ior,
+    /// Twice the part of the diffuse light that goes through: 2 transmits all of it (Burley 2015).
+    DiffTrans,
+    /// The dielectric highlight's reflectance at grazing angles; a metal's is 1.
+    F90,
 }
 
 impl Parameter {
-    /// All scalar parameters, in the report's order.
-    pub const ALL: [Self; 10] = [
+    /// How many there are.
+    pub const COUNT: usize = 14;
+
+    /// All scalar parameters, those of Burley 2012 first.
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Subsurface,
+        Self::Metallic,
+        Self::Specular,
+        Self::SpecularTint,
+        Self::Roughness,
+        Self::Anisotropic,
+        Self::Sheen,
+        Self::SheenTint,
+        Self::Clearcoat,
+        Self::ClearcoatGloss,
+        Self::SpecTrans,
+        Self::Ior,
+        Self::DiffTrans,
+        Self::F90,
+    ];
+
+    /// The ten of Burley 2012, in the report's order, which is that of [`Self::ALL`].
+    pub const BURLEY_2012: [Self; 10] = [
         Self::Subsurface,
         Self::Metallic,
         Self::Specular,
@@ -62,6 +91,10 @@ impl Parameter {
             Self::SheenTint => "sheen_tint",
             Self::Clearcoat => "clearcoat",
             Self::ClearcoatGloss => "clearcoat_gloss",
+            Self::SpecTrans => "spec_trans",
+            Self::Ior => "ior",
+            Self::DiffTrans => "diff_trans",
+            Self::F90 => "f90",
         }
     }
 
@@ -70,11 +103,21 @@ impl Parameter {
         Self::ALL.into_iter().find(|p| p.name() == name)
     }
 
-    /// The largest legal value; the smallest is 0. F0 = 0.08·specular ends at 1; converted materials hold clearcoats up to 4.
+    /// The smallest legal value.
+    pub const fn min(self) -> f32 {
+        match self {
+            Self::Ior => 0.1,
+            _ => 0.0,
+        }
+    }
+
+    /// The largest legal value. F0 = 0.08·specular ends at 1; converted materials hold clearcoats up to 4.
     pub const fn max(self) -> f32 {
         match self {
             Self::Specular => 12.5,
             Self::Clearcoat => 4.0,
+            Self::Ior => 10.0,
+            Self::DiffTrans => 2.0,
             _ => 1.0,
         }
     }
@@ -83,7 +126,8 @@ impl Parameter {
     pub const fn default(self) -> f32 {
         match self {
             Self::Specular | Self::Roughness | Self::SheenTint => 0.5,
-            Self::ClearcoatGloss => 1.0,
+            Self::ClearcoatGloss | Self::F90 => 1.0,
+            Self::Ior => 1.5,
             _ => 0.0,
         }
     }
@@ -91,15 +135,15 @@ impl Parameter {
     /// `value` if it is in range.
     ///
     /// # Errors
-    /// [`OutOfRange`] for NaN and values outside [0, max].
+    /// [`OutOfRange`] for NaN and values outside [min, max].
     pub fn check(self, value: f32) -> Result<f32, OutOfRange> {
-        check_range(self.name(), value, self.max())
+        check_range(self.name(), value, self.min(), self.max())
     }
 }
 
-/// `value` if it is in [0, max].
-pub(crate) fn check_range(name: &'static str, value: f32, max: f32) -> Result<f32, OutOfRange> {
-    if (0.0..=max).contains(&value) { Ok(value) } else { Err(OutOfRange { name, value, max }) }
+/// `value` if it is in [min, max].
+pub(crate) fn check_range(name: &'static str, value: f32, min: f32, max: f32) -> Result<f32, OutOfRange> {
+    if (min..=max).contains(&value) { Ok(value) } else { Err(OutOfRange { name, value, min, max }) }
 }
 
 /// `color` if every channel is in [0, 1].
@@ -107,18 +151,20 @@ pub(crate) fn check_range(name: &'static str, value: f32, max: f32) -> Result<f3
 /// # Errors
 /// [`OutOfRange`] with the first offending channel's value.
 pub fn check_base_color(color: Rgb) -> Result<Rgb, OutOfRange> {
-    color.to_array().into_iter().try_for_each(|v| check_range(BASE_COLOR, v, 1.0).map(drop))?;
+    color.to_array().into_iter().try_for_each(|v| check_range(BASE_COLOR, v, 0.0, 1.0).map(drop))?;
     Ok(color)
 }
 
 /// A parameter outside its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{name} is {value}, but must be in [0, {max}]")]
+#[error("{name} is {value}, but must be in [{min}, {max}]")]
 pub struct OutOfRange {
     /// The parameter.
     pub name: &'static str,
     /// What it was.
     pub value: f32,
+    /// The smallest legal value.
+    pub min: f32,
     /// The largest legal value.
     pub max: f32,
 }
@@ -127,7 +173,7 @@ pub struct OutOfRange {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
-    /// All of Burley 2012.
+    /// All of Burley 2012, with the transmission of Burley 2015.
     #[default]
     Disney,
     /// Lambert, base_color/π, nothing else.
@@ -207,6 +253,21 @@ pub struct Params<F = f32> {
     pub clearcoat: F,
     /// [`Parameter::ClearcoatGloss`].
     pub clearcoat_gloss: F,
+    /// [`Parameter::SpecTrans`].
+    pub spec_trans: F,
+    /// [`Parameter::Ior`].
+    pub ior: F,
+    /// [`Parameter::DiffTrans`].
+    pub diff_trans: F,
+    /// [`Parameter::F90`].
+    pub f90: F,
+    /// A sheet without an inside: light that goes through isn't bent.
+    pub thin_walled: bool,
+    /// What one crossing of the dielectric interface lets pass; where absent the square root of the base colour, so that a pane
+    /// crossed twice shows it once, and the base colour itself if thin-walled (Burley 2015, section 4.1).
+    pub transmission_color: Option<Rgb<F>>,
+    /// The colour of diffuse transmission; the base colour where absent.
+    pub diff_trans_color: Option<Rgb<F>>,
 }
 
 impl<F: Real> Default for Params<F> {
@@ -224,11 +285,30 @@ impl<F: Real> Default for Params<F> {
             sheen_tint: scalar(Parameter::SheenTint),
             clearcoat: scalar(Parameter::Clearcoat),
             clearcoat_gloss: scalar(Parameter::ClearcoatGloss),
+            spec_trans: scalar(Parameter::SpecTrans),
+            ior: scalar(Parameter::Ior),
+            diff_trans: scalar(Parameter::DiffTrans),
+            f90: scalar(Parameter::F90),
+            thin_walled: false,
+            transmission_color: None,
+            diff_trans_color: None,
         }
     }
 }
 
 impl<F: Real> Params<F> {
+    /// The part of the base that scatters by its dielectric interface alone, spec_trans·(1 - metallic).
+    #[inline]
+    pub(super) fn interface_part(&self) -> F {
+        self.spec_trans * (F::ONE - self.metallic)
+    }
+
+    /// The part of the base that is neither metal nor such an interface: it holds diffuse reflection and transmission, and sheen.
+    #[inline]
+    pub(super) fn diffuse_part(&self) -> F {
+        (F::ONE - self.metallic) * (F::ONE - self.spec_trans)
+    }
+
     /// The scalar of that name.
     pub fn get(&self, parameter: Parameter) -> F {
         match parameter {
@@ -242,6 +322,10 @@ impl<F: Real> Params<F> {
             Parameter::SheenTint => self.sheen_tint,
             Parameter::Clearcoat => self.clearcoat,
             Parameter::ClearcoatGloss => self.clearcoat_gloss,
+            Parameter::SpecTrans => self.spec_trans,
+            Parameter::Ior => self.ior,
+            Parameter::DiffTrans => self.diff_trans,
+            Parameter::F90 => self.f90,
         }
     }
 
@@ -258,6 +342,10 @@ impl<F: Real> Params<F> {
             Parameter::SheenTint => &mut self.sheen_tint,
             Parameter::Clearcoat => &mut self.clearcoat,
             Parameter::ClearcoatGloss => &mut self.clearcoat_gloss,
+            Parameter::SpecTrans => &mut self.spec_trans,
+            Parameter::Ior => &mut self.ior,
+            Parameter::DiffTrans => &mut self.diff_trans,
+            Parameter::F90 => &mut self.f90,
         }
     }
 }
@@ -268,8 +356,11 @@ mod tests {
 
     #[test]
     fn names_and_parameters_are_one_to_one() {
-        for p in Parameter::ALL {
+        assert_eq!(Parameter::ALL[..10], Parameter::BURLEY_2012);
+        for (i, p) in Parameter::ALL.into_iter().enumerate() {
             assert_eq!(Parameter::from_name(p.name()), Some(p));
+            assert_eq!(p as usize, i);
+            assert!(p.check(p.default()).is_ok());
             let mut params = Params::<f32>::default();
             *params.get_mut(p) = 0.25;
             assert_eq!(params.get(p), 0.25);

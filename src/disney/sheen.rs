@@ -15,7 +15,7 @@ pub(super) struct Sheen<F> {
 impl<F: Real> Sheen<F> {
     /// `None` where the term is zero. `tint` is the base colour's hue.
     pub(super) fn new(params: &Params<F>, tint: Rgb<F>) -> Option<Self> {
-        let strength = params.sheen * (F::ONE - params.metallic);
+        let strength = params.sheen * params.diffuse_part();
         let color = Rgb::WHITE.lerp(tint, params.sheen_tint) * strength;
         (!color.is_black()).then(|| Self { color, mean: color.mean() })
     }
@@ -27,7 +27,7 @@ impl<F: Real> Sheen<F> {
         self.mean * (F::of(0.002) + F::of(0.088) * slant.sqr() * slant)
     }
 
-    /// sheen·lerp(1, tint, sheen_tint)·(1 - metallic)·(1 - cos θd)⁵, without a 1/π (Burley 2012, section 5.5, and disney.brdf).
+    /// sheen·lerp(1, tint, sheen_tint)·(1 - metallic)·(1 - spec_trans)·(1 - cos θd)⁵, without a 1/π (Burley 2012, section 5.5, and disney.brdf).
     #[inline]
     pub(super) fn eval(&self, pair: &Pair<F>) -> Rgb<F> {
         self.color * pair.schlick

@@ -1,5 +1,6 @@
-//! The specular lobe: GTR2 with Schlick's Fresnel.
+//! The specular lobe: GTR2 with Schlick's Fresnel, blended with a dielectric's where the base is an interface.
 
+use super::fresnel::{DielectricSplit, schlick_weight};
 use super::microfacet::{Alpha, Gtr2, alpha_from_roughness, smith};
 use super::pair::Pair;
 use super::parameter::{Masking, Params};
@@ -10,11 +11,16 @@ use crate::math::{Real, V3};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Specular<F> {
     f0: Rgb<F>,
-    distribution: Gtr2<F>,
+    f90: F,
+    /// The weight of the dielectric's Fresnel term, spec_trans·(1 - metallic); F0 and F90 hold the rest.
+    pub(super) interface: F,
+    /// The interface is smooth: the lobe is a mirror's.
+    pub(super) is_delta: bool,
+    pub(super) distribution: Gtr2<F>,
     /// Of D, and so of the normals that the sampler takes for visible.
-    alpha: Alpha<F>,
+    pub(super) alpha: Alpha<F>,
     /// Of G.
-    masking_alpha: Alpha<F>,
+    pub(super) masking_alpha: Alpha<F>,
     masking: Masking,
     roughness: F,
     // Coefficients of `albedo`: of the part that F0 reflects, and of the part that Schlick's weight adds.
@@ -25,14 +31,37 @@ pub(super) struct Specular<F> {
     edge_spread: F,
 }
 
-/// lerp(0.08·specular·lerp(1, tint, specular_tint), base_color, metallic); may exceed 1.
-pub(super) fn specular_f0<F: Real>(params: &Params<F>, tint: Rgb<F>) -> Rgb<F> {
-    let dielectric = Rgb::WHITE.lerp(tint, params.specular_tint) * (F::of(0.08) * params.specular);
-    dielectric.lerp(params.base_color, params.metallic)
+/// Reflectance head-on and at grazing angles, for Schlick's approximation.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Schlick<F> {
+    /// lerp(0.08·specular·lerp(1, tint, specular_tint), base_color, metallic); may exceed 1.
+    pub(super) f0: Rgb<F>,
+    /// lerp(f90, 1, metallic).
+    pub(super) f90: F,
+}
+
+impl<F: Real> Schlick<F> {
+    /// Of the base without an interface. `tint` is the base colour's hue.
+    pub(super) fn of_base(params: &Params<F>, tint: Rgb<F>) -> Self {
+        Self::weighted(params, tint, F::ZERO)
+    }
+
+    /// Less the share that the interface has of the dielectric part. Terms are ordered so that no rounding enters without one.
+    fn weighted(params: &Params<F>, tint: Rgb<F>, interface: F) -> Self {
+        let Params { metallic, f90, .. } = *params;
+        let dielectric = Rgb::WHITE.lerp(tint, params.specular_tint) * (F::of(0.08) * params.specular);
+        Self {
+            f0: dielectric * (F::ONE - metallic - interface).max(F::ZERO) + params.base_color * metallic,
+            f90: (f90 + (F::ONE - f90) * metallic - f90 * interface).max(F::ZERO),
+        }
+    }
 }
 
 impl<F: Real> Specular<F> {
-    pub(super) fn new(params: &Params<F>, f0: Rgb<F>, masking: Masking) -> Self {
+    pub(super) fn new(params: &Params<F>, tint: Rgb<F>, masking: Masking) -> Self {
+        let interface = params.interface_part();
+        let Schlick { f0, f90 } = Schlick::weighted(params, tint, interface);
+        let is_delta = interface > F::ZERO && params.roughness == F::ZERO;
         let alpha = alpha_from_roughness(params.roughness, params.anisotropic);
         let masking_alpha = match masking {
             Masking::Matched => alpha,
@@ -45,6 +74,9 @@ impl<F: Real> Specular<F> {
         let mean_f0 = f0.mean();
         Self {
             f0,
+            f90,
+            interface,
+            is_delta,
             distribution: Gtr2::new(alpha),
             alpha,
             masking_alpha,
@@ -52,21 +84,25 @@ impl<F: Real> Specular<F> {
             roughness: params.roughness,
             base: mean_f0 * (F::ONE - F::of(0.69) * a),
             base_rise: mean_f0 * F::of(0.3) * a,
-            edge_share: (F::ONE - mean_f0).max(F::of(0.01)),
+            edge_share: (f90 - mean_f0).max(F::of(0.01)),
             edge: F::ONE / (F::ONE + F::of(6.5) * a).sqr(),
             edge_spread: (F::of(4.0) * a).min(F::ONE),
         }
     }
 
-    /// An estimate of the reflected part of light, a fit to the integral, rough where the lobe is dim. Never 0: light is reflected
-    /// even where F0 is 0.
+    /// An estimate of the reflected part of light: exact for a mirror, else a fit to the integral, rough where the lobe is dim. Never 0
+    /// in front: light is reflected even where F0 is 0.
     #[inline]
-    pub(super) fn albedo(&self, wo: V3<F>) -> F {
+    pub(super) fn albedo(&self, wo: V3<F>, split: &DielectricSplit<F>) -> F {
+        if self.is_delta {
+            return self.mirrored(wo, split).mean();
+        }
         let slant = (F::ONE - wo.z).max(F::ZERO);
         let smooth_edge = slant.pow5();
         let rough_edge = slant.sqr() * slant;
         let edge = self.edge * smooth_edge.lerp(rough_edge, self.edge_spread) + F::of(0.002);
         let albedo = self.base + self.base_rise * smooth_edge + self.edge_share * edge;
+        let albedo = albedo + self.interface * split.reflectance;
         match self.masking {
             Masking::Matched => albedo,
             Masking::Remapped => {
@@ -77,24 +113,50 @@ impl<F: Real> Specular<F> {
         }
     }
 
-    /// The BRDF G·F·D (Burley 2012, section 5.4; G holds the 1/(4 cos θi cos θo)), and the density of [`Self::sample`] per unit solid
-    /// angle: with visible normals D·smith(wo)/2.
+    /// The Fresnel term outside, lerp(Schlick, dielectric, spec_trans)·(1 - metallic) and the metal's part.
     #[inline]
-    pub(super) fn eval_with_pdf(&self, pair: &Pair<F>) -> (Rgb<F>, F) {
+    pub(super) fn fresnel(&self, schlick_weight: F, split: &DielectricSplit<F>) -> Rgb<F> {
+        let schlick = self.f0 + (Rgb::grey(self.f90) - self.f0) * schlick_weight;
+        schlick + Rgb::grey(self.interface * split.reflectance)
+    }
+
+    /// What a smooth surface reflects of the light from the mirror direction.
+    #[inline]
+    pub(super) fn mirrored(&self, wo: V3<F>, split: &DielectricSplit<F>) -> Rgb<F> {
+        self.fresnel(schlick_weight(wo.z), split) * self.unmasked(wo).sqr()
+    }
+
+    /// The part of a smooth surface that G lets be seen along `w` above it: all, but `remapped` never has alpha 0.
+    #[inline]
+    pub(super) fn unmasked(&self, w: V3<F>) -> F {
+        match self.masking {
+            Masking::Matched => F::ONE,
+            Masking::Remapped => F::of(2.0) * w.z * smith(w, self.masking_alpha),
+        }
+    }
+
+    /// G·D without a Fresnel term, and the density per unit solid angle of the directions that [`Self::sample`] makes: with visible
+    /// normals D·smith(wo)/2. G holds the 1/(4 cos θi cos θo).
+    #[inline]
+    pub(super) fn shape_with_pdf(&self, pair: &Pair<F>) -> (F, F) {
         let d = self.distribution.density(pair);
         let masking_o = smith(pair.wo, self.masking_alpha);
         let masking_i = smith(pair.wi, self.masking_alpha);
-        let visible_o = match self.masking {
-            Masking::Matched => masking_o,
-            Masking::Remapped => smith(pair.wo, self.alpha),
-        };
-        let fresnel = self.f0 + (Rgb::WHITE - self.f0) * pair.schlick;
-        (fresnel * (masking_o * masking_i * d), F::of(0.5) * d * visible_o)
+        (masking_o * masking_i * d, F::of(0.5) * d * self.visible(pair.wo, masking_o))
     }
 
-    /// `wo` mirrored at a visible normal; may lie below the horizon.
+    /// `smith` of the distribution's own alpha at `wo`, where that of the masking is known.
     #[inline]
-    pub(super) fn sample(&self, wo: V3<F>, u: [F; 2]) -> V3<F> {
-        V3::reflect(wo, self.distribution.sample_visible(wo, u).normalize())
+    pub(super) fn visible(&self, wo: V3<F>, masking_o: F) -> F {
+        match self.masking {
+            Masking::Matched => masking_o,
+            Masking::Remapped => smith(wo, self.alpha),
+        }
+    }
+
+    /// A visible normal, unit length.
+    #[inline]
+    pub(super) fn sample_normal(&self, wo: V3<F>, u: [F; 2]) -> V3<F> {
+        self.distribution.sample_visible(wo, u).normalize()
     }
 }

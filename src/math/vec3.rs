@@ -62,6 +62,12 @@ impl<F: Real> V3<F> {
         V3::new(G::of(self.x.to_f64()), G::of(self.y.to_f64()), G::of(self.z.to_f64()))
     }
 
+    /// Mirrored by the plane z = 0.
+    #[inline]
+    pub fn mirrored_z(self) -> Self {
+        Self::new(self.x, self.y, -self.z)
+    }
+
     /// `wo` mirrored about `n`, both pointing away from the surface: 2(wo·n)n - wo.
     ///
     /// glam's `reflect` takes the incoming direction, that is, the other sign.

@@ -20,6 +20,10 @@ pub(super) struct PreparedMaterial {
     pub(super) sides: Sides,
     /// Light goes through: the inside is a place of its own.
     pub(super) is_interface: bool,
+    /// What that place takes of light per metre, if it takes any.
+    pub(super) absorption: Option<Rgb>,
+    /// A clear sheet: shadow rays may pass.
+    pub(super) lets_shadow_rays_pass: bool,
 }
 
 #[derive(Debug)]
@@ -57,15 +61,21 @@ enum Tangent {
 
 impl PreparedMaterial {
     pub(super) fn new(material: &Material) -> Self {
+        let colors = [
+            Some(&material.base_color),
+            material.transmission_color.as_ref(),
+            material.diff_trans_color.as_ref(),
+        ];
         let varies = material.vertex_color
-            || material.base_color.constant().is_none()
+            || colors.into_iter().flatten().any(|c| c.constant().is_none())
             || material.scalars.iter().any(|s| s.constant().is_none());
-        let bsdf = if varies && matches!(material.model, Model::Disney | Model::Diffuse) {
+        let bsdf = if varies && material.model != Model::Mirror {
             Scattering::Varying(Box::new(material.clone()))
         } else {
             let base_color = material.base_color.constant().unwrap_or(Rgb::WHITE);
             let scalar = |p: Parameter| material.scalar(p).constant().unwrap_or(p.default());
-            Scattering::Constant(scatter(material, base_color, scalar))
+            let color = |c: &Param<Rgb>| c.constant().unwrap_or(Rgb::WHITE);
+            Scattering::Constant(scatter(material, base_color, color, scalar))
         };
         let emission = match (&material.emission.color, material.emits()) {
             (_, false) => Emitting::Nothing,
@@ -83,7 +93,9 @@ impl PreparedMaterial {
             normal_map: material.normal_map.clone(),
             tangent: tangent(material),
             sides: material.sides,
-            is_interface: material.model == Model::Dielectric,
+            is_interface: material.is_interface(),
+            absorption: Some(material.absorption).filter(|a| material.is_interface() && !a.is_black()),
+            lets_shadow_rays_pass: is_clear_sheet(material),
         }
     }
 
@@ -92,9 +104,14 @@ impl PreparedMaterial {
         matches!(self.bsdf, Scattering::Constant(_))
     }
 
-    /// It blocks all light that reaches it from outside.
-    pub(super) fn is_opaque(&self) -> bool {
+    /// All of it is there.
+    pub(super) fn covers_all(&self) -> bool {
         matches!(self.opacity, Covering::Opaque)
+    }
+
+    /// It blocks every shadow ray.
+    pub(super) fn blocks_shadow_rays(&self) -> bool {
+        self.covers_all() && !self.lets_shadow_rays_pass
     }
 
     /// The mean radiance of an emitting material and the sides that emit: for choosing lights.
@@ -154,19 +171,28 @@ impl PreparedMaterial {
                 }
                 // Products of factors, textures and vertex colours may leave the range by their own rounding or by intent.
                 let base_color = base_color.map(|v| v.clamp(0.0, 1.0));
-                scatter(material, base_color, |p| {
-                    read_scalar(scene, material.scalar(p), at).clamp(0.0, p.max())
+                let color = |c: &Param<Rgb>| read_color(scene, c, at).map(|v| v.clamp(0.0, 1.0));
+                scatter(material, base_color, color, |p| {
+                    read_scalar(scene, material.scalar(p), at).clamp(p.min(), p.max())
                 })
             }
         }
     }
 
-    /// The shading frame around `normal`, which may be turned to the viewer; `is_front` tells which side that is.
+    /// The shading frame around `normal`, which may be turned to the viewer; `is_front` tells which side that is. A mapped normal is
+    /// first passed to `correct`.
     #[inline]
-    pub(super) fn frame(&self, scene: &Scene, at: &TrianglePoint<'_>, normal: Vec3, is_front: bool) -> Frame {
+    pub(super) fn frame(
+        &self,
+        scene: &Scene,
+        at: &TrianglePoint<'_>,
+        normal: Vec3,
+        is_front: bool,
+        correct: impl FnOnce(Vec3) -> Vec3,
+    ) -> Frame {
         let normal = match &self.normal_map {
             None => normal,
-            Some(map) => self.mapped_normal(scene, map, at, normal, is_front),
+            Some(map) => correct(self.mapped_normal(scene, map, at, normal, is_front)),
         };
         match self.tangent {
             Tangent::Any => Frame::from_normal(normal),
@@ -199,10 +225,21 @@ impl PreparedMaterial {
     }
 }
 
-fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f32) -> Bsdf {
+fn scatter(
+    material: &Material,
+    base_color: Rgb,
+    color: impl Fn(&Param<Rgb>) -> Rgb,
+    scalar: impl Fn(Parameter) -> f32,
+) -> Bsdf {
     match material.model {
         Model::Disney => {
-            let mut params = Params { base_color, ..Params::default() };
+            let mut params = Params {
+                base_color,
+                thin_walled: material.thin_walled,
+                transmission_color: material.transmission_color.as_ref().map(&color),
+                diff_trans_color: material.diff_trans_color.as_ref().map(&color),
+                ..Params::default()
+            };
             for p in Parameter::ALL {
                 *params.get_mut(p) = scalar(p);
             }
@@ -210,8 +247,18 @@ fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f
         }
         Model::Diffuse => Bsdf::diffuse(base_color),
         Model::Mirror => Bsdf::mirror(),
-        Model::Dielectric => Bsdf::dielectric(material.ior),
+        Model::Dielectric => Bsdf::dielectric(scalar(Parameter::Ior)),
     }
+}
+
+/// Whether light may go straight through: a thin sheet whose transmission is somewhere not spread by roughness. Burley's sheets of an index
+/// below 0.35/0.65 spread nothing at any roughness.
+fn is_clear_sheet(material: &Material) -> bool {
+    let may = |p: Parameter, is: fn(f32) -> bool| material.scalar(p).constant().is_none_or(is);
+    material.model == Model::Disney
+        && material.thin_walled
+        && may(Parameter::SpecTrans, |t| t > 0.0)
+        && (may(Parameter::Roughness, |r| r == 0.0) || may(Parameter::Ior, |n| n < 0.54))
 }
 
 fn covering(material: &Material) -> Covering {

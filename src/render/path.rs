@@ -5,9 +5,11 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 use super::Prepared;
+use super::medium::{self, Medium};
 use super::surface::{Shading, Surface, offset};
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
+use crate::disney::Lobe;
 use crate::light::{LightPlace, LightSample};
 use crate::math::sobol::{Purpose, Sampler};
 
@@ -66,6 +68,7 @@ pub(super) fn trace(
     // Radiance grows by eta² on entering glass and shrinks again on leaving: roulette must not see that.
     let mut eta_scale = 1.0f32;
     let mut scatterings = 0;
+    let mut medium: Medium = None;
 
     for vertex in 1.. {
         // Find the next surface, or leave the scene.
@@ -73,11 +76,15 @@ pub(super) fn trace(
         let Some(hit) = next_surface(scene, sampler, vertex, &ray) else {
             if let Some((radiance, pdf_light)) = scene.lights.environment(ray.direction) {
                 let w_bsdf = last_scatter.map_or(1.0, |s| power_heuristic(s.pdf, pdf_light));
-                path.radiance += beta * radiance * w_bsdf;
+                path.radiance += beta * radiance * w_bsdf * medium::transmittance(medium, f32::INFINITY);
             }
             break;
         };
         let surface = Surface::new(scene, &ray, &hit);
+        medium = surface.medium_before(medium);
+        if medium.is_some() {
+            beta *= medium::transmittance(medium, hit.t);
+        }
 
         // Add what the surface sends out by itself.
         let emitted = surface.emitted(scene);
@@ -98,34 +105,47 @@ pub(super) fn trace(
         inspect(ReplayVertex { point: surface.point.into(), radiance: path.radiance, beta });
         let Some(shading) = shading else { break };
         if scatterings == scene.settings.max_depth {
-            break;
+            // Going straight through a clear sheet is no scattering: shadow rays do it too.
+            let Some(passing) = shading.bsdf.straight_transmittance(shading.wo) else { break };
+            beta *= passing;
+            ray = surface.leave(ray.direction);
+            continue;
         }
 
         // Sample a light, unless no light could be reflected from it.
         if !shading.bsdf.is_delta() && !scene.lights.is_empty() {
             let [u_light, u0, u1, _] = sampler.set(vertex, Purpose::Light);
             if let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) {
-                path.radiance += beta * direct_light(scene, &surface, &shading, &sample, &mut path.rays);
+                path.radiance +=
+                    beta * direct_light(scene, &surface, &shading, &sample, medium, &mut path.rays);
             }
         }
 
         // Sample the BSDF for the next direction.
         let [u_lobe, u0, u1, u_roulette] = sampler.set(vertex, Purpose::Bsdf);
         let Some(sample) = shading.bsdf.sample(shading.wo, u_lobe, [u0, u1]) else { break };
-        let wi = shading.frame.world_from_local(sample.wi).normalize();
-        let transmits = sample.wi.z * shading.wo.z < 0.0;
-        if surface.same_side(wi) == transmits {
+        let goes_straight = sample.lobe == Lobe::StraightTransmission;
+        let wi = match goes_straight {
+            true => ray.direction,
+            false => shading.frame.world_from_local(sample.wi).normalize(),
+        };
+        if surface.same_side(wi) == sample.lobe.is_transmission() {
             break;
         }
         beta *= sample.f * (sample.wi.z.abs() / sample.pdf);
         if beta.is_black() {
             break;
         }
+        ray = surface.leave(wi);
+        medium = surface.medium_towards(wi, medium);
+        // What a clear sheet lets pass was weighed, and is still to be, as if the sheet were not there.
+        if goes_straight {
+            continue;
+        }
         eta_scale *= sample.eta * sample.eta;
         scatterings += 1;
         last_scatter =
             (!sample.lobe.is_delta()).then_some(LastScatter { point: surface.point, pdf: sample.pdf });
-        ray = surface.leave(wi);
 
         // End paths that carry little, and let survivors stand for them.
         if scatterings > ROULETTE_START {
@@ -144,7 +164,7 @@ pub(super) fn trace(
 #[inline]
 fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray: &Ray) -> Option<Hit> {
     let bvh = &scene.geometry.bvh;
-    if scene.all_opaque {
+    if scene.all_covered {
         return bvh.closest(ray);
     }
     bvh.closest_where(ray, |hit| {
@@ -160,12 +180,14 @@ fn direct_light(
     surface: &Surface<'_>,
     shading: &Shading,
     sample: &LightSample,
+    arrived: Medium,
     rays: &mut u64,
 ) -> Rgb {
-    if !surface.same_side(sample.wi) {
+    let wi = shading.frame.local_from_world(sample.wi);
+    let goes_through = (wi.z < 0.0) != (shading.wo.z < 0.0);
+    if surface.same_side(sample.wi) == goes_through {
         return Rgb::BLACK;
     }
-    let wi = shading.frame.local_from_world(sample.wi);
     let (f, pdf_bsdf) = shading.bsdf.eval_with_pdf(shading.wo, wi);
     if f.is_black() {
         return Rgb::BLACK;
@@ -191,22 +213,47 @@ fn direct_light(
         return Rgb::BLACK;
     }
     *rays += 1;
-    f * arriving * (wi.z.abs() * w_light / sample.pdf * transmittance(scene, &shadow))
+    let mut passing = transmittance(scene, &shadow);
+    let medium = surface.medium_towards(sample.wi, arrived);
+    if medium.is_some() {
+        let is_far = matches!(sample.place, LightPlace::Far { .. });
+        let distance = if is_far { f32::INFINITY } else { shadow.direction.length() };
+        passing *= medium::transmittance(medium, distance);
+    }
+    f * arriving * passing * (wi.z.abs() * w_light / sample.pdf)
 }
 
 /// The fraction of light that passes a segment: the product of what each surface on it lets through.
 #[inline]
-fn transmittance(scene: &Prepared, shadow: &Ray) -> f32 {
+fn transmittance(scene: &Prepared, shadow: &Ray) -> Rgb {
     if scene.all_opaque {
-        return if scene.geometry.bvh.occluded(shadow) { 0.0 } else { 1.0 };
+        return if scene.geometry.bvh.occluded(shadow) { Rgb::BLACK } else { Rgb::WHITE };
     }
-    let mut passing = 1.0;
+    let mut passing = Rgb::WHITE;
+    let ray = Ray { direction: shadow.direction.normalize(), ..*shadow };
     let blocked = scene.geometry.bvh.visit(shadow, |hit| {
-        let material = scene.material_of(hit.triangle);
-        passing *= 1.0 - material.alpha(&scene.scene, &scene.geometry.at(&hit));
-        if passing > 0.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        passing *= passing_surface(scene, &ray, &hit);
+        if passing.is_black() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    if blocked { 0.0 } else { passing }
+    if blocked { Rgb::BLACK } else { passing }
+}
+
+/// What a surface lets pass of light that goes straight through it along `ray`: where it isn't there, all, and a clear sheet its part.
+#[inline]
+fn passing_surface(scene: &Prepared, ray: &Ray, hit: &Hit) -> Rgb {
+    let material = scene.material_of(hit.triangle);
+    if material.blocks_shadow_rays() {
+        return Rgb::BLACK;
+    }
+    let alpha = material.alpha(&scene.scene, &scene.geometry.at(hit));
+    let absent = Rgb::grey(1.0 - alpha);
+    if alpha == 0.0 || !material.lets_shadow_rays_pass {
+        return absent;
+    }
+    let sheet = Surface::new(scene, ray, hit)
+        .shading(scene)
+        .and_then(|shading| shading.bsdf.straight_transmittance(shading.wo));
+    sheet.map_or(absent, |passing| absent + passing * alpha)
 }
 
 fn first_hit(scene: &Prepared, ray: &Ray, surface: &Surface<'_>, shading: Option<&Shading>) -> FirstHit {

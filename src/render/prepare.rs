@@ -27,7 +27,9 @@ pub struct Prepared {
     pub(super) settings: RenderSettings,
     pub(super) width: u32,
     pub(super) height: u32,
-    /// No surface lets light pass, so that a shadow ray needs no look at materials.
+    /// No surface is partly there, so that a ray needs no look at materials.
+    pub(super) all_covered: bool,
+    /// No surface lets shadow rays pass, so that they need none either.
     pub(super) all_opaque: bool,
 }
 
@@ -52,7 +54,11 @@ impl Prepared {
             }
         }
         let lights = collect_lights(&scene, &geometry, &materials);
-        let all_opaque = scene.instances.iter().all(|i| materials[i.material.0 as usize].is_opaque());
+        let all = |is: fn(&PreparedMaterial) -> bool| {
+            scene.instances.iter().all(|i| is(&materials[i.material.0 as usize]))
+        };
+        let all_covered = all(PreparedMaterial::covers_all);
+        let all_opaque = all(PreparedMaterial::blocks_shadow_rays);
         Ok(Self {
             camera: film_camera,
             filter: FilterSampler::new(settings.filter, settings.filter_radius),
@@ -61,6 +67,7 @@ impl Prepared {
             lights,
             width,
             height,
+            all_covered,
             all_opaque,
             scene,
             geometry,
@@ -83,8 +90,11 @@ impl Prepared {
                 self.materials.len()
             ));
         }
-        if self.all_opaque {
+        if self.all_covered {
             skipped.push("opacity: every surface is opaque".to_owned());
+        }
+        if !self.scene.materials.iter().any(|m| m.item.transmits()) {
+            skipped.push("transmission: nothing lets light through".to_owned());
         }
         for (count, what) in
             [(areas, "area lights"), (punctual, "punctual lights"), (environments, "environment")]

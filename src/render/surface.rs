@@ -4,7 +4,9 @@ use glam::Vec3;
 
 use super::Prepared;
 use super::geometry::TrianglePoint;
+use super::mapped_normal::keep_reflection_above;
 use super::material::PreparedMaterial;
+use super::medium::Medium;
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::disney::Bsdf;
@@ -88,13 +90,35 @@ impl<'a> Surface<'a> {
     }
 
     fn frame_around(&self, scene: &Prepared, normal: Vec3) -> Frame {
-        self.material.frame(&scene.scene, &self.at, normal, self.is_front || self.material.is_interface)
+        let is_front = self.is_front || self.material.is_interface;
+        self.material.frame(&scene.scene, &self.at, normal, is_front, |mapped| {
+            // An interface's normal points outside, also where the viewer is inside.
+            let side = if self.is_front == is_front { 1.0 } else { -1.0 };
+            let towards_viewer = if self.is_front { self.normal } else { -self.normal };
+            keep_reflection_above(mapped * side, towards_viewer, self.wo) * side
+        })
     }
 
     /// Whether `wi` leaves on the viewer's side of the geometric surface.
     #[inline]
     pub(super) fn same_side(&self, wi: Vec3) -> bool {
         (wi.dot(self.normal) > 0.0) == self.is_front
+    }
+
+    /// The medium that `wi` leaves into, for a path that came through `arrived`: interfaces have one behind them and clear space in front.
+    #[inline]
+    pub(super) fn medium_towards(&self, wi: Vec3, arrived: Medium) -> Medium {
+        match self.material.is_interface {
+            false => arrived,
+            true if wi.dot(self.normal) > 0.0 => None,
+            true => self.material.absorption,
+        }
+    }
+
+    /// The medium that the path came through, which was in `assumed` by what it knew: the back of an interface tells better.
+    #[inline]
+    pub(super) fn medium_before(&self, assumed: Medium) -> Medium {
+        if self.material.is_interface && !self.is_front { self.material.absorption } else { assumed }
     }
 
     /// A ray from here that can't meet its own surface again, nor what lies in the same plane.

@@ -172,7 +172,15 @@ fn dump_material(out: &mut String, m: &Material) -> fmt::Result {
         DiffuseModel::Lambert => "lambert".into(),
         DiffuseModel::LambertFresnel => "lambert_fresnel".into(),
     });
-    line("ior", m.ior != default.ior, &|| m.ior.to_string());
+    for (name, color) in
+        [("transmission_color", &m.transmission_color), ("diff_trans_color", &m.diff_trans_color)]
+    {
+        if let Some(color) = color {
+            line(name, true, &|| param(color, rgb, Reading::Color));
+        }
+    }
+    line("thin_walled", m.thin_walled, &|| "true".into());
+    line("absorption", m.absorption != default.absorption, &|| rgb(m.absorption));
     line("emission", m.emission != default.emission, &|| {
         let color = param(&m.emission.color, rgb, Reading::Color);
         format!("{color}, strength {}, {}", m.emission.strength, sides(m.emission.sides))

@@ -15,14 +15,20 @@ pub struct Material {
     pub model: Model,
     /// Linear reflectance.
     pub base_color: Param<Rgb>,
-    /// The ten scalars of Burley 2012, in the order of [`Parameter::ALL`].
-    pub scalars: [Param<f32>; 10],
+    /// The scalars, in the order of [`Parameter::ALL`].
+    pub scalars: [Param<f32>; Parameter::COUNT],
+    /// What one crossing of the dielectric interface lets pass; see [`crate::disney::Params`] for the default.
+    pub transmission_color: Option<Param<Rgb>>,
+    /// The colour of diffuse transmission; the base colour where absent.
+    pub diff_trans_color: Option<Param<Rgb>>,
+    /// A sheet without an inside.
+    pub thin_walled: bool,
+    /// What the inside of an interface takes of light, the coefficients of Beer's law per metre.
+    pub absorption: Rgb,
     /// The roughness of the specular lobe's masking term.
     pub masking: Masking,
     /// The diffuse term.
     pub diffuse: DiffuseModel,
-    /// The refractive index inside over outside, for [`Model::Dielectric`].
-    pub ior: f32,
     /// Light that the surface sends out by itself.
     pub emission: Emission,
     /// How much of the surface is there.
@@ -48,9 +54,12 @@ impl Default for Material {
             model: Model::Disney,
             base_color: Param::Constant(Rgb::grey(0.8)),
             scalars: Parameter::ALL.map(|p| Param::Constant(p.default())),
+            transmission_color: None,
+            diff_trans_color: None,
+            thin_walled: false,
+            absorption: Rgb::BLACK,
             masking: Masking::default(),
             diffuse: DiffuseModel::default(),
-            ior: 1.5,
             emission: Emission::default(),
             opacity: Opacity::default(),
             normal_map: None,
@@ -72,6 +81,21 @@ impl Material {
     /// A mutable reference to the scalar of that name.
     pub fn scalar_mut(&mut self, parameter: Parameter) -> &mut Param<f32> {
         &mut self.scalars[parameter as usize]
+    }
+
+    /// Light goes through somewhere: by the dielectric interface, or diffusely.
+    pub fn transmits(&self) -> bool {
+        let may = |p| self.scalar(p).constant().is_none_or(|value| value > 0.0);
+        match self.model {
+            Model::Dielectric => true,
+            Model::Disney => may(Parameter::SpecTrans) || may(Parameter::DiffTrans),
+            Model::Diffuse | Model::Mirror => false,
+        }
+    }
+
+    /// Its surface divides places: light that goes through enters or leaves an inside.
+    pub fn is_interface(&self) -> bool {
+        self.transmits() && (self.model == Model::Dielectric || !self.thin_walled)
     }
 
     /// Whether any light leaves the surface by itself.

@@ -110,7 +110,8 @@ fn smooth_glass_is_a_dielectric_and_rough_glass_is_told() {
         ..Default::default()
     };
     let (material, notes, _) = converted(&glass);
-    assert_eq!((material.model, material.ior), (Model::Dielectric, 1.45));
+    assert_eq!(material.model, Model::Dielectric);
+    assert_eq!(material.scalar(Parameter::Ior).constant(), Some(1.45));
     assert_eq!(material.opacity.alpha, Param::Constant(1.0));
     assert_eq!(quality(&notes, "illum"), Some(Quality::Approximated));
     let (material, notes, _) = converted(&MtlMaterial { pr: Some(0.4), ..glass.clone() });

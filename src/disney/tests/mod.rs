@@ -6,6 +6,7 @@ mod consistency;
 mod delta;
 mod mercator;
 mod stress;
+mod transmission;
 
 use super::{Bsdf, DiffuseModel, Masking, Parameter, Params};
 use crate::color::Rgb;
@@ -49,8 +50,33 @@ impl Random {
             base_color: Rgb::new(self.parameter(), self.parameter(), self.parameter()),
             ..Params::default()
         };
-        for p in Parameter::ALL {
+        for p in Parameter::BURLEY_2012 {
             *params.get_mut(p) = self.parameter() * p.max().min(4.0);
+        }
+        params
+    }
+
+    /// Parameters of a surface that may transmit.
+    fn transmissive_params(&mut self) -> Params {
+        let mut params = self.params();
+        if self.bits().is_multiple_of(2) {
+            params.metallic = 0.0;
+        }
+        params.spec_trans = self.parameter();
+        params.diff_trans = 2.0 * self.parameter();
+        params.f90 = self.parameter();
+        params.ior = match self.bits() % 6 {
+            0 => 1.0,
+            1 => Parameter::Ior.min(),
+            2 => Parameter::Ior.max(),
+            3 => 1.0 + 0.01 * (self.unit() - 0.5),
+            _ => 1.0 + 1.5 * self.unit(),
+        };
+        params.thin_walled = self.bits().is_multiple_of(3);
+        if self.bits().is_multiple_of(2) {
+            let color = Rgb::new(self.parameter(), self.parameter(), self.parameter());
+            params.transmission_color = Some(color);
+            params.diff_trans_color = Some(color);
         }
         params
     }
@@ -92,7 +118,13 @@ impl Random {
 }
 
 fn cast(params: &Params) -> Params<f64> {
-    let mut twin = Params::<f64> { base_color: params.base_color.cast(), ..Params::default() };
+    let mut twin = Params::<f64> {
+        base_color: params.base_color.cast(),
+        thin_walled: params.thin_walled,
+        transmission_color: params.transmission_color.map(Rgb::cast),
+        diff_trans_color: params.diff_trans_color.map(Rgb::cast),
+        ..Params::default()
+    };
     for p in Parameter::ALL {
         *twin.get_mut(p) = f64::from(params.get(p));
     }
@@ -105,6 +137,8 @@ struct Twin {
     name: String,
     single: Bsdf<f32>,
     double: Bsdf<f64>,
+    /// By which light that passes is bent: 1 where it isn't.
+    ior: f64,
 }
 
 impl Twin {
@@ -113,12 +147,24 @@ impl Twin {
             name: format!("{name} {masking:?} {diffuse:?}"),
             single: Bsdf::disney(params, masking, diffuse),
             double: Bsdf::disney(&cast(params), masking, diffuse),
+            ior: if params.thin_walled { 1.0 } else { f64::from(params.ior) },
         }
     }
 }
 
-/// Materials that mix the lobes in different ways, from a satin to a smooth, coated, anisotropic one.
+/// Materials that mix the lobes in different ways: named ones, and as many made at random.
 fn mixed_materials() -> Vec<Twin> {
+    let mut random = Random::new(77);
+    let masking = |m: bool| if m { Masking::Remapped } else { Masking::Matched };
+    let at_random = (0..14).map(|i| {
+        let params = if i < 7 { random.params() } else { random.transmissive_params() };
+        Twin::disney(&format!("random {i} {params:?}"), &params, masking(i % 2 == 1), random.diffuse_model())
+    });
+    let at_random: Vec<Twin> = at_random.collect();
+    reflecting_materials().into_iter().chain(transmitting_materials()).chain(at_random).collect()
+}
+
+fn reflecting_materials() -> Vec<Twin> {
     use DiffuseModel::{Burley, Lambert, LambertFresnel};
     use Masking::{Matched, Remapped};
     use Parameter as P;
@@ -151,6 +197,53 @@ fn mixed_materials() -> Vec<Twin> {
     ]
 }
 
+/// Glass, sheets and leaves; those at roughness 0 have delta lobes beside others.
+fn transmitting_materials() -> Vec<Twin> {
+    use Masking::{Matched, Remapped};
+    use Parameter as P;
+    let glass = |name: &str, scalars: &[(P, f32)], masking| {
+        let all: Vec<_> = [(P::SpecTrans, 1.0)].into_iter().chain(scalars.iter().copied()).collect();
+        recipe(name, &all, masking, DiffuseModel::Burley)
+    };
+    let sheet = |name: &str, scalars: &[(P, f32)]| {
+        let mut params =
+            Params { base_color: Rgb::new(0.9, 0.6, 0.3), thin_walled: true, ..Params::default() };
+        for (parameter, value) in scalars {
+            *params.get_mut(*parameter) = *value;
+        }
+        Twin::disney(name, &params, Matched, DiffuseModel::Burley)
+    };
+    let half = [(P::SpecTrans, 0.5), (P::Roughness, 0.3), (P::Clearcoat, 1.0), (P::Sheen, 0.5)];
+    let metal = [(P::Metallic, 0.4), (P::Roughness, 0.25), (P::SpecularTint, 1.0)];
+    let leaf = [(P::DiffTrans, 1.0), (P::Roughness, 0.4), (P::Subsurface, 0.5)];
+    let everything = [(P::DiffTrans, 1.2), (P::SpecTrans, 0.4), (P::Roughness, 0.35), (P::Sheen, 1.0)];
+    vec![
+        glass("ground glass", &[(P::Roughness, 0.5)], Matched),
+        glass("polished glass", &[(P::Roughness, 0.1)], Matched),
+        glass("dense glass", &[(P::Roughness, 0.4), (P::Ior, 2.4)], Matched),
+        glass("bubble", &[(P::Roughness, 0.3), (P::Ior, 0.7)], Matched),
+        glass("hardly bending", &[(P::Roughness, 0.6), (P::Ior, 1.02)], Matched),
+        glass("brushed glass", &[(P::Roughness, 0.5), (P::Anisotropic, 0.9)], Matched),
+        glass("remapped glass", &[(P::Roughness, 0.3)], Remapped),
+        glass("smooth glass under a coat", &[(P::Roughness, 0.0), (P::Clearcoat, 1.0)], Matched),
+        glass("index-matched", &[(P::Roughness, 0.5), (P::Ior, 1.0)], Matched),
+        recipe("half glass", &half, Matched, DiffuseModel::Burley),
+        glass("glass and metal", &metal, Remapped),
+        recipe(
+            "smooth and diffuse",
+            &[(P::SpecTrans, 0.5), (P::Roughness, 0.0)],
+            Remapped,
+            DiffuseModel::Lambert,
+        ),
+        recipe("solid leaf", &leaf, Matched, DiffuseModel::Burley),
+        recipe("solid everything", &everything, Matched, DiffuseModel::LambertFresnel),
+        sheet("frosted sheet", &[(P::SpecTrans, 1.0), (P::Roughness, 0.5)]),
+        sheet("clear sheet", &[(P::SpecTrans, 0.7), (P::Roughness, 0.0)]),
+        sheet("leaf", &leaf),
+        sheet("sheet of everything", &everything),
+    ]
+}
+
 fn recipe(name: &str, scalars: &[(Parameter, f32)], masking: Masking, diffuse: DiffuseModel) -> Twin {
     let mut params = Params { base_color: Rgb::new(0.7, 0.3, 0.1), ..Params::default() };
     for (parameter, value) in scalars {
@@ -165,4 +258,9 @@ fn views() -> [V3<f32>; 4] {
         let r = (1.0 - z * z).sqrt();
         V3::new(r * Real::cos(0.5), r * Real::sin(0.5), z)
     })
+}
+
+/// The same from inside.
+fn views_from_both_sides() -> Vec<V3<f32>> {
+    views().into_iter().chain(views().map(V3::mirrored_z)).collect()
 }

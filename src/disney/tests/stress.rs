@@ -39,9 +39,9 @@ fn corners_of_everything_stay_finite() {
         })
         .collect();
     let mut random = Random::new(6);
-    for corner in 0..1u32 << Parameter::ALL.len() {
+    for corner in 0..1u32 << Parameter::BURLEY_2012.len() {
         let mut params = Params { base_color: Rgb::new(1.0, 0.0, 0.5), ..Params::default() };
-        for (bit, p) in Parameter::ALL.into_iter().enumerate() {
+        for (bit, p) in Parameter::BURLEY_2012.into_iter().enumerate() {
             *params.get_mut(p) = if corner >> bit & 1 == 1 { p.max() } else { 0.0 };
         }
         if corner % 3 == 0 {

@@ -308,7 +308,7 @@ fn read_disney(
 ) -> Result<ArisDisney, ArisError> {
     let color = reflectance(config, label)?;
     let mut scalars = [None; 10];
-    for parameter in Parameter::ALL {
+    for parameter in Parameter::BURLEY_2012 {
         let key = ArisDisney::key(parameter);
         let Some(node) = config.get(key) else {
             let what = format!("{label}.{key} is not given; {} is taken", parameter.default());

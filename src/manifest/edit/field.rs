@@ -50,7 +50,14 @@ fields! {
         Model "model": "one of \"disney\", \"diffuse\", \"mirror\", \"dielectric\"",
         Masking "masking": "one of \"matched\", \"remapped\"",
         Diffuse "diffuse": "one of \"burley\", \"lambert\", \"lambert_fresnel\"",
+        SpecTrans "spec_trans": "a number in [0, 1]",
         Ior "ior": "a number in [0.1, 10]",
+        DiffTrans "diff_trans": "a number in [0, 2]",
+        F90 "f90": "a number in [0, 1]",
+        TransmissionColor "transmission_color": "a colour [r, g, b] in [0, 1] or \"#rrggbb\", or false for none",
+        DiffTransColor "diff_trans_color": "a colour [r, g, b] in [0, 1] or \"#rrggbb\", or false for none",
+        ThinWalled "thin_walled": "true or false",
+        Absorption "absorption": "coefficients [r, g, b] per metre, not negative",
         EmissionColor "emission_color": "a colour [r, g, b], not negative, or \"#rrggbb\"",
         EmissionStrength "emission_strength": "a number, not negative",
         Opacity "opacity": "a number in [0, 1]",
@@ -133,9 +140,9 @@ mod tests {
     fn every_scalar_is_a_field_and_says_its_range() {
         for p in Parameter::ALL {
             let field = MaterialField::from_name(p.name()).unwrap();
-            assert_eq!(field.expects(), format!("a number in [0, {}]", p.max()));
+            assert_eq!(field.expects(), format!("a number in [{}, {}]", p.min(), p.max()));
             assert_eq!(field.parameter(), Some(p));
         }
-        assert_eq!(MaterialField::Ior.parameter(), None);
+        assert_eq!(MaterialField::Model.parameter(), None);
     }
 }

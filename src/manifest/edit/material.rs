@@ -36,7 +36,22 @@ pub(super) fn set(material: &mut Material, field: MaterialField, value: &Value) 
                 _ => None,
             })?;
         }
-        MaterialField::Ior => material.ior = value::number(value, 0.1, 10.0)?,
+        MaterialField::TransmissionColor => {
+            let color = value::or_none(value, |v| value::color(v, 1.0))?;
+            material.transmission_color = color.map(Param::Constant);
+        }
+        MaterialField::DiffTransColor => {
+            let color = value::or_none(value, |v| value::color(v, 1.0))?;
+            material.diff_trans_color = color.map(Param::Constant);
+        }
+        MaterialField::ThinWalled => material.thin_walled = value::flag(value)?,
+        MaterialField::Absorption => {
+            let coefficients = value::numbers::<3>(value)?;
+            if coefficients.iter().any(|&c| c < 0.0) {
+                return Err(Mismatch);
+            }
+            material.absorption = Rgb::from(coefficients);
+        }
         MaterialField::EmissionColor => {
             let color: Rgb = value::color(value, f32::MAX)?;
             material.emission.color = Param::Constant(color);
@@ -57,7 +72,7 @@ pub(super) fn set(material: &mut Material, field: MaterialField, value: &Value) 
             }
         }
         MaterialField::Rotation => material.rotation = value::any_degrees(value)?,
-        // The ten scalars, done above.
+        // The scalars, done above.
         MaterialField::Subsurface
         | MaterialField::Metallic
         | MaterialField::Specular
@@ -67,7 +82,11 @@ pub(super) fn set(material: &mut Material, field: MaterialField, value: &Value) 
         | MaterialField::Sheen
         | MaterialField::SheenTint
         | MaterialField::Clearcoat
-        | MaterialField::ClearcoatGloss => return Err(Mismatch),
+        | MaterialField::ClearcoatGloss
+        | MaterialField::SpecTrans
+        | MaterialField::Ior
+        | MaterialField::DiffTrans
+        | MaterialField::F90 => return Err(Mismatch),
     }
     Ok(Outcome::Set)
 }

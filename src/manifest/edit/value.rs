@@ -72,6 +72,14 @@ pub(super) fn text(value: &Value) -> Result<&str, Mismatch> {
     }
 }
 
+/// `true` or `false`.
+pub(super) fn flag(value: &Value) -> Result<bool, Mismatch> {
+    match *value {
+        Value::Bool(flag) => Ok(flag),
+        _ => Err(Mismatch),
+    }
+}
+
 /// One of the variants that `from_name` knows.
 pub(super) fn choice<T>(value: &Value, from_name: impl Fn(&str) -> Option<T>) -> Result<T, Mismatch> {
     text(value).and_then(|t| from_name(t).ok_or(Mismatch))

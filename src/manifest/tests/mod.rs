@@ -352,7 +352,7 @@ fail = -1
     6 | "material.ball.rougness" = 0.5
       | ^^^^^^^^^^^^^^^^^^^^^^^^
       |
-      = help: did you mean `roughness`? a material has `base_color`, `subsurface`, `metallic`, `specular`, `specular_tint`, `roughness`, `anisotropic`, `sheen`, `sheen_tint`, `clearcoat`, `clearcoat_gloss`, `model`, `masking`, `diffuse`, `ior`, `emission_color`, `emission_strength`, `opacity`, `cutoff`, `normal_scale`, `rotation`
+      = help: did you mean `roughness`? a material has `base_color`, `subsurface`, `metallic`, `specular`, `specular_tint`, `roughness`, `anisotropic`, `sheen`, `sheen_tint`, `clearcoat`, `clearcoat_gloss`, `model`, `masking`, `diffuse`, `spec_trans`, `ior`, `diff_trans`, `f90`, `transmission_color`, `diff_trans_color`, `thin_walled`, `absorption`, `emission_color`, `emission_strength`, `opacity`, `cutoff`, `normal_scale`, `rotation`
 
     error: `material.ball.base_color` is [0.9, 1.2, 0.1], but must be a colour [r, g, b] in [0, 1] or "#rrggbb"
      --> configs/test.toml:7:30

@@ -55,7 +55,7 @@ impl Default for ArisBrdf {
 pub struct ArisDisney {
     /// `color`, linear.
     pub color: Rgb,
-    /// The ten scalars in the order of [`Parameter::ALL`]; none where the file says nothing.
+    /// The ten scalars in the order of [`Parameter::BURLEY_2012`]; none where the file says nothing.
     pub scalars: [Option<f32>; 10],
 }
 
