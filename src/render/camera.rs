@@ -58,6 +58,11 @@ impl FilmCamera {
         })
     }
 
+    /// The ray from the middle of the lens along the viewing axis.
+    pub(super) fn axis_ray(&self) -> Ray {
+        Ray::new(Vec3::from(self.world_from_camera.translation), self.axis)
+    }
+
     /// The ray of a film position in pixels from the top left corner; its direction has unit length.
     pub(super) fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Ray {
         let p = film + self.pixel_offset - self.half_size;

@@ -28,7 +28,7 @@ pub(super) struct PreparedMaterial {
 
 #[derive(Debug)]
 enum Scattering {
-    Constant(Bsdf),
+    Constant(Box<Bsdf>),
     Varying(Box<Material>),
 }
 
@@ -75,7 +75,7 @@ impl PreparedMaterial {
             let base_color = material.base_color.constant().unwrap_or(Rgb::WHITE);
             let scalar = |p: Parameter| material.scalar(p).constant().unwrap_or(p.default());
             let color = |c: &Param<Rgb>| c.constant().unwrap_or(Rgb::WHITE);
-            Scattering::Constant(scatter(material, base_color, color, scalar))
+            Scattering::Constant(Box::new(scatter(material, base_color, color, scalar)))
         };
         let emission = match (&material.emission.color, material.emits()) {
             (_, false) => Emitting::Nothing,
@@ -162,7 +162,7 @@ impl PreparedMaterial {
     #[inline]
     pub(super) fn bsdf(&self, scene: &Scene, at: &TrianglePoint<'_>) -> Bsdf {
         match &self.bsdf {
-            Scattering::Constant(bsdf) => *bsdf,
+            Scattering::Constant(bsdf) => **bsdf,
             Scattering::Varying(material) => {
                 let mut base_color = read_color(scene, &material.base_color, at);
                 if material.vertex_color {

@@ -68,7 +68,7 @@ pub(super) fn trace(
     // Radiance grows by eta² on entering glass and shrinks again on leaving: roulette must not see that.
     let mut eta_scale = 1.0f32;
     let mut scatterings = 0;
-    let mut medium: Medium = None;
+    let mut medium = scene.camera_medium;
 
     for vertex in 1.. {
         // Find the next surface, or leave the scene.

@@ -7,6 +7,7 @@ use super::camera::FilmCamera;
 use super::filter::FilterSampler;
 use super::geometry::Geometry;
 use super::material::PreparedMaterial;
+use super::medium::Medium;
 use crate::light::{EmissiveTriangle, EnvironmentLight, Lights};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Camera, Named, Scene};
@@ -27,6 +28,8 @@ pub struct Prepared {
     pub(super) settings: RenderSettings,
     pub(super) width: u32,
     pub(super) height: u32,
+    /// What the camera is in: the inside of the first interface along its axis, if that is met from behind.
+    pub(super) camera_medium: Medium,
     /// No surface is partly there, so that a ray needs no look at materials.
     pub(super) all_covered: bool,
     /// No surface lets shadow rays pass, so that they need none either.
@@ -57,6 +60,9 @@ impl Prepared {
         let all = |is: fn(&PreparedMaterial) -> bool| {
             scene.instances.iter().all(|i| is(&materials[i.material.0 as usize]))
         };
+        let camera_medium = medium_around(&film_camera, &geometry, |triangle| {
+            &materials[scene.instances[geometry.instance_of(triangle)].material.0 as usize]
+        });
         let all_covered = all(PreparedMaterial::covers_all);
         let all_opaque = all(PreparedMaterial::blocks_shadow_rays);
         Ok(Self {
@@ -67,6 +73,7 @@ impl Prepared {
             lights,
             width,
             height,
+            camera_medium,
             all_covered,
             all_opaque,
             scene,
@@ -148,6 +155,17 @@ fn size_for(camera: &Camera, settings: &RenderSettings) -> (u32, u32) {
             (round(f64::from(height) * aspect), height)
         }
     }
+}
+
+fn medium_around<'a>(
+    camera: &FilmCamera,
+    geometry: &Geometry,
+    material_of: impl Fn(u32) -> &'a PreparedMaterial,
+) -> Medium {
+    let ray = camera.axis_ray();
+    let hit = geometry.bvh.closest_where(&ray, |hit| material_of(hit.triangle).is_interface)?;
+    let is_behind = geometry.at(&hit).geometric_normal().dot(ray.direction) > 0.0;
+    material_of(hit.triangle).absorption.filter(|_| is_behind)
 }
 
 fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), RenderError> {

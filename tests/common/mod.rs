@@ -107,3 +107,52 @@ pub(crate) fn largest_error(rendered: &Rendered, exact: f64) -> f64 {
     let [r, _, _] = rendered.raster.picture().rgb().expect("a colour picture");
     r.iter().map(|&v| (f64::from(v) / exact - 1.0).abs()).fold(0.0, f64::max)
 }
+
+/// A closed cube of half side `half` around the origin, facing outwards.
+pub(crate) fn cube(half: f32) -> Mesh {
+    let positions = (0..8)
+        .map(|i| {
+            let side = |bit: u32| if i >> bit & 1 == 1 { half } else { -half };
+            Vec3::new(side(0), side(1), side(2))
+        })
+        .collect();
+    let triangles = [
+        [0, 2, 1],
+        [1, 2, 3],
+        [4, 5, 6],
+        [5, 7, 6],
+        [0, 1, 4],
+        [1, 5, 4],
+        [2, 6, 3],
+        [3, 6, 7],
+        [0, 4, 2],
+        [2, 4, 6],
+        [1, 3, 5],
+        [3, 7, 5],
+    ];
+    Mesh { name: "cube".into(), positions, triangles: triangles.to_vec(), ..Mesh::default() }
+}
+
+/// A cube's inside whose ceiling is open where z < 0; the opening is [`skylight`].
+pub(crate) fn room_with_skylight(material: Material) -> Vec<(Mesh, Material)> {
+    let mut walls = cube(0.5);
+    walls.triangles.retain(|t| !t.iter().all(|&c| walls.positions[c as usize].y > 0.0));
+    let mut ceiling = skylight();
+    for p in &mut ceiling.positions {
+        p.z += 0.5;
+    }
+    vec![(walls, material.clone()), (ceiling, material)]
+}
+
+/// The half of the plane y = ½ over the room where z < 0.
+pub(crate) fn skylight() -> Mesh {
+    let at = |x: f32, z: f32| Vec3::new(x, 0.5, z);
+    let positions = vec![at(-0.5, -0.5), at(0.5, -0.5), at(0.5, 0.0), at(-0.5, 0.0)];
+    Mesh { name: "skylight".into(), positions, triangles: vec![[0, 2, 1], [0, 3, 2]], ..Mesh::default() }
+}
+
+/// The three colour channels `NAME.R`, `NAME.G` and `NAME.B` of the data part.
+pub(crate) fn layer<'a>(rendered: &'a Rendered, name: &str) -> [&'a [f32]; 3] {
+    let data = rendered.raster.layers.iter().find(|l| l.name == "data").expect("a data part");
+    ["R", "G", "B"].map(|c| &data.channel(&format!("{name}.{c}")).expect("a channel").values[..])
+}
