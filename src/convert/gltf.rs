@@ -10,7 +10,9 @@ use crate::scene::Material;
 use crate::scene::material::{
     Emission, NormalMap, Opacity, Param, ShadingFrame, Sides, TextureChannel, TextureMap,
 };
-use crate::scene::source::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
+use crate::scene::source::{
+    AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular, GltfVolume,
+};
 
 /// glTF's index of refraction where KHR_materials_ior says nothing.
 const DEFAULT_IOR: f32 = 1.5;
@@ -81,6 +83,7 @@ pub(super) fn convert(
     if let Some(anisotropy) = &source.anisotropy {
         convert_anisotropy(anisotropy, source, &mut material, &mut notes);
     }
+    convert_transmission(source, &mut material, &mut notes);
     convert_emission(source, &mut material, &mut notes);
     if let Some(map) = &source.normal_texture {
         material.normal_map = Some(NormalMap { map: map.clone(), scale: source.normal_scale });
@@ -228,6 +231,7 @@ fn convert_specular(
     let specular = ((disney_luminance(f0) / F0_OF_SPECULAR) as f32).min(Parameter::Specular.max());
     *material.scalar_mut(Parameter::Specular) = Param::Constant(specular);
     *material.scalar_mut(Parameter::SpecularTint) = Param::Constant(tint.amount);
+    *material.scalar_mut(Parameter::F90) = Param::Constant(extension.factor);
     match source.ior {
         Some(0.0) => {
             let reason = "0 means a reflectance of 1 at all angles: F0 is 1, but the diffuse term stays";
@@ -243,7 +247,7 @@ fn convert_specular(
     if source.specular.is_some() {
         let mut reason = format!("luminance of F0 exact, hue: {}", tint.describe());
         if extension.factor != 1.0 {
-            reason.push_str("; the factor doesn't lower the reflectance at grazing angles (f90)");
+            reason.push_str("; f90 carries the factor to grazing angles");
         }
         notes.add("KHR_materials_specular", Quality::Approximated, &reason);
     }
@@ -310,152 +314,70 @@ fn convert_anisotropy(
     notes.add("KHR_materials_anisotropy", quality, reason);
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::TextureId;
+/// A colour of 0 stands for this little: nothing would be left at any distance, and infinity is no coefficient.
+const DARKEST: f64 = 1e-6;
 
-    fn run(source: &GltfMaterial) -> (Material, Vec<Note>) {
-        let (mut notes, mut warnings) = (Vec::new(), Vec::new());
-        let material = convert("m", source, DiffuseModel::Burley, &mut notes, &mut warnings);
-        (material, notes)
+/// KHR_materials_transmission, _volume and _diffuse_transmission: a thin sheet, unless the volume has a thickness.
+fn convert_transmission(source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
+    let solid = source.volume.filter(|v| v.thickness > 0.0);
+    let transmits = source.transmission.is_some() || source.diffuse_transmission.is_some();
+    material.thin_walled = transmits && solid.is_none();
+    if transmits {
+        set_ior(source, material, notes);
     }
-
-    fn scalar(material: &Material, parameter: Parameter) -> f32 {
-        material.scalar(parameter).constant().unwrap()
-    }
-
-    fn quality(notes: &[Note], field: &str) -> Quality {
-        notes.iter().find(|n| n.field == field).unwrap().quality
-    }
-
-    #[test]
-    fn the_core_maps_one_to_one() {
-        let map = TextureMap::new(TextureId(3), TextureChannel::R);
-        let source = GltfMaterial {
-            base_color_factor: Rgb::new(0.1, 0.2, 0.3),
-            metallic_factor: 0.25,
-            roughness_factor: 0.75,
-            metallic_roughness_texture: Some(map.clone()),
-            ..GltfMaterial::default()
-        };
-        let (material, notes) = run(&source);
-        assert_eq!(material.base_color, Param::Constant(Rgb::new(0.1, 0.2, 0.3)));
-        let read = |channel, factor| Param::Texture { map: TextureMap { channel, ..map.clone() }, factor };
-        assert_eq!(*material.scalar(Parameter::Metallic), read(TextureChannel::B, 0.25));
-        assert_eq!(*material.scalar(Parameter::Roughness), read(TextureChannel::G, 0.75));
-        assert_eq!(scalar(&material, Parameter::Specular), 0.5, "F0 is 0.04");
-        assert_eq!(scalar(&material, Parameter::SheenTint), 0.0);
-        assert_eq!(quality(&notes, "baseColorFactor"), Quality::Carried);
-        let mut notes = Vec::new();
-        convert("m", &source, DiffuseModel::LambertFresnel, &mut notes, &mut Vec::new());
-        assert_eq!(quality(&notes, "baseColorFactor"), Quality::Exact);
-    }
-
-    #[test]
-    fn alpha_modes_become_coverage() {
-        let with = |alpha_mode| {
-            let source = GltfMaterial { alpha_mode, alpha_factor: 0.25, ..GltfMaterial::default() };
-            run(&source).0.opacity
-        };
-        assert_eq!(with(AlphaMode::Opaque), Opacity::default());
-        let alpha = Param::Constant(0.25);
-        assert_eq!(with(AlphaMode::Blend), Opacity { alpha: alpha.clone(), cutoff: None });
-        assert_eq!(with(AlphaMode::Mask { cutoff: 0.5 }), Opacity { alpha, cutoff: Some(0.5) });
-    }
-
-    #[test]
-    fn emission_leaves_both_sides_only_if_double_sided() {
-        let source = GltfMaterial {
-            emissive_factor: Rgb::grey(0.5),
-            emissive_strength: 4.0,
-            ..GltfMaterial::default()
-        };
-        let emission = run(&source).0.emission;
-        let expected =
-            Emission { color: Param::Constant(Rgb::grey(0.5)), strength: 4.0, sides: Sides::Front };
-        assert_eq!(emission, expected);
-        let both = run(&GltfMaterial { double_sided: true, ..source }).0;
-        assert_eq!((both.emission.sides, both.sides), (Sides::Both, Sides::Both));
-    }
-
-    #[test]
-    fn ior_becomes_specular() {
-        let specular = |ior| {
-            let (material, notes) = run(&GltfMaterial { ior: Some(ior), ..GltfMaterial::default() });
-            (scalar(&material, Parameter::Specular), quality(&notes, "KHR_materials_ior"))
-        };
-        assert!((specular(1.79).0 - 1.0).abs() < 3e-3);
-        assert!((specular(2.42).0 - 2.155).abs() < 1e-3, "diamond");
-        assert_eq!(specular(1.0), (0.0, Quality::Carried));
-        assert_eq!(specular(0.0), (12.5, Quality::Approximated));
-    }
-
-    #[test]
-    fn a_specular_colour_of_the_bases_hue_is_kept() {
-        let base = Rgb::new(0.8, 0.4, 0.2);
-        let source = |color| GltfMaterial {
-            base_color_factor: base,
-            specular: Some(GltfSpecular { factor: 0.5, color }),
-            ..GltfMaterial::default()
-        };
-        let (material, notes) = run(&source(base));
-        assert!((scalar(&material, Parameter::SpecularTint) - 1.0).abs() < 1e-6);
-        let f0 = 0.04 * 0.5 * disney_luminance(base.cast()) as f32;
-        assert!((scalar(&material, Parameter::Specular) - f0 / 0.08).abs() < 1e-6);
-        let note = notes.iter().find(|n| n.field == "KHR_materials_specular").unwrap();
-        assert!(note.reason.contains("hue: exact"), "{}", note.reason);
-        let (material, notes) = run(&source(Rgb::new(0.2, 0.4, 0.8)));
-        assert_eq!(scalar(&material, Parameter::SpecularTint), 0.0, "the opposite hue");
-        let note = notes.iter().find(|n| n.field == "KHR_materials_specular").unwrap();
-        assert!(note.reason.contains("off by"), "{}", note.reason);
-    }
-
-    #[test]
-    fn a_coat_of_factor_1_is_four_times_disneys() {
-        let coat = |roughness| GltfClearcoat { factor: 1.0, texture: None, roughness };
-        let with =
-            |roughness| run(&GltfMaterial { clearcoat: Some(coat(roughness)), ..GltfMaterial::default() }).0;
-        assert_eq!(scalar(&with(0.0), Parameter::Clearcoat), 4.0);
-        assert_eq!(scalar(&with(0.0), Parameter::ClearcoatGloss), 1.0);
-        assert_eq!(scalar(&with(1.0), Parameter::ClearcoatGloss), 0.0);
-        let gloss = scalar(&with(0.2), Parameter::ClearcoatGloss);
-        assert!((0.1 * (1.0 - gloss) + 0.001 * gloss - 0.04).abs() < 1e-6, "alpha is roughness²");
-    }
-
-    #[test]
-    fn anisotropy_gives_gltfs_two_alphas() {
-        for (roughness, strength) in [(0.8f32, 0.5f32), (0.5, 0.6), (1.0, 1.0), (0.7, 0.0)] {
-            let anisotropy = Some(GltfAnisotropy { strength, rotation: 0.3 });
-            let source = GltfMaterial { roughness_factor: roughness, anisotropy, ..GltfMaterial::default() };
-            let (material, notes) = run(&source);
-            // The parametrisation of disney.brdf.
-            let aspect = (1.0 - 0.9 * scalar(&material, Parameter::Anisotropic)).sqrt();
-            let r2 = Real::sqr(scalar(&material, Parameter::Roughness));
-            let a = roughness * roughness;
-            let t = a + (1.0 - a) * strength * strength;
-            assert!((r2 / aspect - t).abs() < 1e-5, "along the tangent");
-            assert!((r2 * aspect - a).abs() < 1e-5, "along the bitangent");
-            assert_eq!(material.rotation, 0.3);
-            assert_eq!(quality(&notes, "KHR_materials_anisotropy"), Quality::Exact);
+    if let Some(transmission) = &source.transmission {
+        let map = transmission.texture.as_ref();
+        *material.scalar_mut(Parameter::SpecTrans) = textured(transmission.factor, map, TextureChannel::R);
+        if solid.is_some() {
+            material.transmission_color = Some(material.base_color.clone());
+            let reason = "the base colour tints each crossing of the surface";
+            notes.add("KHR_materials_transmission", Quality::Exact, reason);
+        } else {
+            let reason = "a thin sheet, tinted once by the base colour; Burley's roughness for what passes, (0.65·ior - \
+                          0.35)·roughness, is less than glTF's";
+            notes.add("KHR_materials_transmission", Quality::Approximated, reason);
         }
-        let anisotropy = Some(GltfAnisotropy { strength: 1.0, rotation: 0.0 });
-        let (material, notes) =
-            run(&GltfMaterial { roughness_factor: 0.0, anisotropy, ..GltfMaterial::default() });
-        assert_eq!(scalar(&material, Parameter::Anisotropic), 1.0);
-        assert_eq!(quality(&notes, "KHR_materials_anisotropy"), Quality::Approximated);
     }
-
-    #[test]
-    fn what_is_not_read_is_dropped_aloud() {
-        let source = GltfMaterial {
-            unread: vec!["KHR_materials_iridescence".into()],
-            unlit: true,
-            ..GltfMaterial::default()
-        };
-        let (material, notes) = run(&source);
-        assert_eq!(quality(&notes, "KHR_materials_iridescence"), Quality::Dropped);
-        assert_eq!(material.model, Model::Diffuse);
-        assert_eq!(material.emission.color, Param::Constant(Rgb::WHITE));
+    if let Some(diffuse) = &source.diffuse_transmission {
+        let map = diffuse.texture.as_ref();
+        *material.scalar_mut(Parameter::DiffTrans) = textured(2.0 * diffuse.factor, map, TextureChannel::A);
+        material.diff_trans_color = Some(colored(diffuse.color, diffuse.color_texture.as_ref()));
+        let reason = "diff_trans = 2·factor; what passes isn't dimmed by the highlight's Fresnel term";
+        notes.add("KHR_materials_diffuse_transmission", Quality::Approximated, reason);
+    }
+    if let Some(volume) = source.volume {
+        convert_volume(&volume, transmits, material, notes);
     }
 }
+
+fn convert_volume(volume: &GltfVolume, transmits: bool, material: &mut Material, notes: &mut Notes) {
+    let field = "KHR_materials_volume";
+    if volume.thickness == 0.0 {
+        notes.add(field, Quality::Exact, "thickness 0: a thin sheet");
+    } else if !transmits {
+        notes.add(field, Quality::Exact, "of no effect, since nothing passes the surface");
+    } else {
+        let distance = f64::from(volume.attenuation_distance);
+        let color = volume.attenuation_color.cast::<f64>();
+        material.absorption = color.map(|c| -libm::log(c.max(DARKEST)) / distance).cast();
+        match color.to_array().contains(&0.0) {
+            true => notes.add(field, Quality::Approximated, "an attenuation colour of 0 is taken for 10⁻⁶"),
+            false => notes.add(field, Quality::Exact, "for a closed mesh"),
+        }
+    }
+}
+
+/// The index by which light that passes is bent. Without KHR_materials_ior it is 1.5.
+fn set_ior(source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
+    let ior = source.ior.unwrap_or(DEFAULT_IOR);
+    // 0 stands for a reflectance of 1: nothing passes that it could bend.
+    let taken = if ior == 0.0 { Parameter::Ior.max() } else { ior.min(Parameter::Ior.max()) };
+    *material.scalar_mut(Parameter::Ior) = Param::Constant(taken);
+    if taken != ior {
+        let reason = format!("what passes is bent as by an index of {taken}");
+        notes.add("KHR_materials_ior", Quality::Approximated, &reason);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -51,18 +51,22 @@ fn model(source: &MtlMaterial) -> Model {
     }
 }
 
-/// Smooth glass: refraction is asked for by `illum` 6 or 7, or by 4 with a filter that lets light pass, and nothing makes the
-/// surface rough or a metal.
-fn is_glass(source: &MtlMaterial) -> bool {
+/// Refraction is asked for by `illum` 6 or 7, or by 4 with a filter that lets light pass, and nothing makes the surface a metal.
+fn refracts(source: &MtlMaterial) -> bool {
     let passes = source.tf.map(|tf| tf.max_channel() > 0.0);
     let asked = match source.illum {
         Some(6 | 7) => passes.unwrap_or(true),
         Some(4) => passes.unwrap_or(false),
         _ => false,
     };
-    let smooth = source.pr.unwrap_or(0.0) <= 0.0 && source.map(MtlSlot::Pr).is_none();
     let metal = source.pm.unwrap_or(0.0) > 0.0 || source.map(MtlSlot::Pm).is_some();
-    asked && smooth && !metal
+    asked && !metal
+}
+
+/// Smooth glass: nothing makes a surface that refracts rough.
+fn is_glass(source: &MtlMaterial) -> bool {
+    let smooth = source.pr.unwrap_or(0.0) <= 0.0 && source.map(MtlSlot::Pr).is_none();
+    refracts(source) && smooth
 }
 
 struct Conversion<'a> {
@@ -341,7 +345,7 @@ impl Conversion<'_> {
             (None, Some(tr)) => Some(("Tr", 1.0 - self.limited("Tr", tr, 1.0))),
             (None, None) => None,
         };
-        if self.out.model == Model::Dielectric {
+        if refracts(self.source) {
             let reason = "the glass lets light pass already";
             let exact = alpha.is_some_and(|(_, alpha)| alpha == 1.0);
             if let Some((field, _)) = alpha {
@@ -370,25 +374,28 @@ impl Conversion<'_> {
     fn transmission(&mut self) {
         let illum = self.source.illum;
         if self.out.model == Model::Dielectric {
-            let ni = self.source.ni.unwrap_or(1.5);
-            if ni > 0.0 {
-                self.set(Parameter::Ior, ni);
-            } else {
-                self.warn(format!("Ni is {ni}, but must be above 0; {} is taken", Parameter::Ior.default()));
-            }
-            if self.source.ni.is_some() {
-                self.note("Ni", Quality::Exact, "");
-            }
+            self.index_of_glass();
             self.note(
                 "illum",
                 Quality::Approximated,
                 "a smooth dielectric: Fresnel reflection and refraction",
             );
             match self.source.tf {
-                Some(tf) if tf != Rgb::WHITE => self.note("Tf", Quality::Dropped, "clear glass has no tint"),
+                Some(tf) if tf != Rgb::WHITE => {
+                    // The same interface in the model that has a tint.
+                    self.out.model = Model::Disney;
+                    self.set(Parameter::Roughness, 0.0);
+                    self.tinted_interface(tf);
+                }
                 Some(_) => self.note("Tf", Quality::Exact, ""),
                 None => {}
             }
+            return;
+        }
+        if refracts(self.source) {
+            self.index_of_glass();
+            self.tinted_interface(self.source.tf.unwrap_or(Rgb::WHITE));
+            self.note("illum", Quality::Approximated, "rough glass, of Pr's roughness");
             return;
         }
         let asks = matches!(illum, Some(4 | 6 | 7 | 9));
@@ -413,10 +420,36 @@ impl Conversion<'_> {
                 _ if !asks => "illum asks for no transmission",
                 Some(9) => "transparency without refraction is d's",
                 _ if tf.is_black() => "nothing passes",
-                _ => "rough glass is not rendered: the surface is opaque but for d",
+                _ => "metal lets nothing pass",
             };
             let exact = !asks || tf.is_black();
             self.note("Tf", if exact { Quality::Exact } else { Quality::Dropped }, reason);
+        }
+    }
+
+    /// `Ni` as the index of what lets light pass.
+    fn index_of_glass(&mut self) {
+        let Some(ni) = self.source.ni else { return };
+        match Parameter::Ior.check(ni) {
+            Ok(ni) => self.set(Parameter::Ior, ni),
+            Err(range) => {
+                self.warn(format!("Ni: {range}; {} is taken", Parameter::Ior.default()));
+            }
+        }
+        self.note("Ni", Quality::Exact, "");
+    }
+
+    /// `Tf` as what each crossing of the surface lets pass.
+    fn tinted_interface(&mut self, tf: Rgb) {
+        self.set(Parameter::SpecTrans, 1.0);
+        let tint = self.limited_color("Tf", tf);
+        self.out.transmission_color = Some(Param::Constant(tint));
+        if self.source.tf.is_some() {
+            self.note(
+                "Tf",
+                Quality::Approximated,
+                "tints each crossing of the surface, whatever the thickness",
+            );
         }
     }
 

@@ -101,7 +101,7 @@ fn dissolve_wins_over_transparency() {
 }
 
 #[test]
-fn smooth_glass_is_a_dielectric_and_rough_glass_is_told() {
+fn smooth_glass_is_a_dielectric_and_rough_or_tinted_glass_an_interface() {
     let glass = MtlMaterial {
         illum: Some(7),
         ni: Some(1.45),
@@ -115,8 +115,16 @@ fn smooth_glass_is_a_dielectric_and_rough_glass_is_told() {
     assert_eq!(material.opacity.alpha, Param::Constant(1.0));
     assert_eq!(quality(&notes, "illum"), Some(Quality::Approximated));
     let (material, notes, _) = converted(&MtlMaterial { pr: Some(0.4), ..glass.clone() });
-    assert_eq!(material.model, Model::Disney);
-    assert_eq!(quality(&notes, "Tf"), Some(Quality::Dropped));
+    assert_eq!((material.model, material.is_interface()), (Model::Disney, true));
+    assert_eq!((constant(&material, Parameter::Roughness), constant(&material, Parameter::Ior)), (0.4, 1.45));
+    assert_eq!(quality(&notes, "Tf"), Some(Quality::Approximated));
+    let tf = Rgb::new(0.9, 0.5, 0.1);
+    let (material, ..) = converted(&MtlMaterial { tf: Some(tf), ..glass.clone() });
+    assert_eq!(
+        (constant(&material, Parameter::SpecTrans), constant(&material, Parameter::Roughness)),
+        (1.0, 0.0)
+    );
+    assert_eq!(material.transmission_color, Some(Param::Constant(tf)));
     let (material, ..) = converted(&MtlMaterial { illum: Some(4), tf: None, ..glass });
     assert_eq!(material.model, Model::Disney, "illum 4 alone is plain transparency");
 }

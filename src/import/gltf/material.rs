@@ -10,7 +10,10 @@ use super::error::GltfError;
 use super::texture::{Slot, Textures};
 use crate::color::Rgb;
 use crate::scene::material::TextureMap;
-use crate::scene::source::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
+use crate::scene::source::{
+    AlphaMode, GltfAnisotropy, GltfClearcoat, GltfDiffuseTransmission, GltfMaterial, GltfSheen, GltfSpecular,
+    GltfTransmission, GltfVolume,
+};
 use crate::scene::texture::Encoding;
 
 /// The legal values of a number.
@@ -18,6 +21,7 @@ use crate::scene::texture::Encoding;
 enum Limits {
     Unit,
     NotNegative,
+    Positive,
     Finite,
     Ior,
 }
@@ -92,6 +96,7 @@ impl Reader<'_, '_> {
         let (fits, expected) = match limits {
             Limits::Unit => ((0.0..=1.0).contains(&value), "in [0, 1]"),
             Limits::NotNegative => (value.is_finite() && value >= 0.0, "finite and not negative"),
+            Limits::Positive => (value.is_finite() && value > 0.0, "finite and above 0"),
             Limits::Finite => (value.is_finite(), "finite"),
             Limits::Ior => (value.is_finite() && (value == 0.0 || value >= 1.0), "0, or at least 1"),
         };
@@ -208,6 +213,52 @@ impl Reader<'_, '_> {
                 });
                 self.skip(json.anisotropy_texture.as_ref(), "KHR_materials_anisotropy.anisotropyTexture");
             }
+            "KHR_materials_transmission" => {
+                let json: Transmission = parse(json)?;
+                material.transmission = Some(GltfTransmission {
+                    factor: self.number("transmissionFactor", json.transmission_factor, Limits::Unit)?,
+                    texture: self.info(
+                        json.transmission_texture.as_ref(),
+                        Encoding::Linear,
+                        "transmissionTexture",
+                    )?,
+                });
+            }
+            "KHR_materials_volume" => {
+                let json: Volume = parse(json)?;
+                let distance = json.attenuation_distance;
+                material.volume = Some(GltfVolume {
+                    thickness: self.number("thicknessFactor", json.thickness_factor, Limits::NotNegative)?,
+                    attenuation_color: self.color(
+                        "attenuationColor",
+                        json.attenuation_color,
+                        Limits::Unit,
+                    )?,
+                    attenuation_distance: match distance {
+                        None => f32::INFINITY,
+                        Some(distance) => self.number("attenuationDistance", distance, Limits::Positive)?,
+                    },
+                });
+            }
+            "KHR_materials_diffuse_transmission" => {
+                let json: DiffuseTransmission = parse(json)?;
+                let factor = json.diffuse_transmission_factor;
+                let color = json.diffuse_transmission_color_factor;
+                material.diffuse_transmission = Some(GltfDiffuseTransmission {
+                    factor: self.number("diffuseTransmissionFactor", factor, Limits::Unit)?,
+                    texture: self.info(
+                        json.diffuse_transmission_texture.as_ref(),
+                        Encoding::Linear,
+                        "diffuseTransmissionTexture",
+                    )?,
+                    color: self.color("diffuseTransmissionColorFactor", color, Limits::Unit)?,
+                    color_texture: self.info(
+                        json.diffuse_transmission_color_texture.as_ref(),
+                        Encoding::Srgb,
+                        "diffuseTransmissionColorTexture",
+                    )?,
+                });
+            }
             other => self.unread.push(other.to_owned()),
         }
         Ok(())
@@ -281,4 +332,48 @@ struct Anisotropy {
     anisotropy_strength: f32,
     anisotropy_rotation: f32,
     anisotropy_texture: Option<Info>,
+}
+
+/// KHR_materials_transmission.
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Transmission {
+    transmission_factor: f32,
+    transmission_texture: Option<Info>,
+}
+
+/// KHR_materials_volume. The thickness texture is for rasterisers, as the extension says.
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Volume {
+    thickness_factor: f32,
+    attenuation_distance: Option<f32>,
+    attenuation_color: [f32; 3],
+}
+
+impl Default for Volume {
+    fn default() -> Self {
+        Self { thickness_factor: 0.0, attenuation_distance: None, attenuation_color: [1.0; 3] }
+    }
+}
+
+/// KHR_materials_diffuse_transmission.
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct DiffuseTransmission {
+    diffuse_transmission_factor: f32,
+    diffuse_transmission_texture: Option<Info>,
+    diffuse_transmission_color_factor: [f32; 3],
+    diffuse_transmission_color_texture: Option<Info>,
+}
+
+impl Default for DiffuseTransmission {
+    fn default() -> Self {
+        Self {
+            diffuse_transmission_factor: 0.0,
+            diffuse_transmission_texture: None,
+            diffuse_transmission_color_factor: [1.0; 3],
+            diffuse_transmission_color_texture: None,
+        }
+    }
 }

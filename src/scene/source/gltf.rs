@@ -48,6 +48,12 @@ pub struct GltfMaterial {
     pub sheen: Option<GltfSheen>,
     /// KHR_materials_anisotropy.
     pub anisotropy: Option<GltfAnisotropy>,
+    /// KHR_materials_transmission.
+    pub transmission: Option<GltfTransmission>,
+    /// KHR_materials_volume.
+    pub volume: Option<GltfVolume>,
+    /// KHR_materials_diffuse_transmission.
+    pub diffuse_transmission: Option<GltfDiffuseTransmission>,
     /// KHR_materials_unlit: the surface shows its base colour whatever the light.
     pub unlit: bool,
     /// What the file says about the material that is not read: extensions and textures of extensions, by name.
@@ -107,6 +113,39 @@ pub struct GltfAnisotropy {
     pub rotation: f32,
 }
 
+/// KHR_materials_transmission.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GltfTransmission {
+    /// `transmissionFactor`, in [0, 1].
+    pub factor: f32,
+    /// `transmissionTexture`: its red channel multiplies the factor.
+    pub texture: Option<TextureMap>,
+}
+
+/// KHR_materials_volume, its constant factors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GltfVolume {
+    /// `thicknessFactor`, not negative: 0 is a thin sheet. A path tracer needs no more of it.
+    pub thickness: f32,
+    /// `attenuationColor`, in [0, 1], linear: what is left of white light after `attenuation_distance`.
+    pub attenuation_color: Rgb,
+    /// `attenuationDistance` in metres, above 0; infinite where the file says nothing.
+    pub attenuation_distance: f32,
+}
+
+/// KHR_materials_diffuse_transmission.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GltfDiffuseTransmission {
+    /// `diffuseTransmissionFactor`, in [0, 1].
+    pub factor: f32,
+    /// `diffuseTransmissionTexture`: its alpha multiplies the factor.
+    pub texture: Option<TextureMap>,
+    /// `diffuseTransmissionColorFactor`, in [0, 1], linear.
+    pub color: Rgb,
+    /// `diffuseTransmissionColorTexture`, sRGB.
+    pub color_texture: Option<TextureMap>,
+}
+
 impl Default for GltfMaterial {
     /// The specification's default material: white metal of roughness 1.
     fn default() -> Self {
@@ -131,6 +170,9 @@ impl Default for GltfMaterial {
             clearcoat: None,
             sheen: None,
             anisotropy: None,
+            transmission: None,
+            volume: None,
+            diffuse_transmission: None,
             unlit: false,
             unread: Vec::new(),
         }
@@ -141,12 +183,16 @@ impl GltfMaterial {
     /// Every texture that is read, with the field it stands in.
     pub fn textures(&self) -> impl Iterator<Item = (&'static str, &TextureMap)> {
         let coat = self.clearcoat.as_ref().and_then(|c| c.texture.as_ref());
+        let diffuse = self.diffuse_transmission.as_ref();
         [
             ("baseColorTexture", self.base_color_texture.as_ref()),
             ("metallicRoughnessTexture", self.metallic_roughness_texture.as_ref()),
             ("normalTexture", self.normal_texture.as_ref()),
             ("emissiveTexture", self.emissive_texture.as_ref()),
             ("clearcoatTexture", coat),
+            ("transmissionTexture", self.transmission.as_ref().and_then(|t| t.texture.as_ref())),
+            ("diffuseTransmissionTexture", diffuse.and_then(|d| d.texture.as_ref())),
+            ("diffuseTransmissionColorTexture", diffuse.and_then(|d| d.color_texture.as_ref())),
         ]
         .into_iter()
         .filter_map(|(field, map)| map.map(|map| (field, map)))

@@ -5,7 +5,10 @@ mod gltf;
 mod mtl;
 
 pub use aris::{ArisBrdf, ArisDisney, ArisMaterial};
-pub use gltf::{AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular};
+pub use gltf::{
+    AlphaMode, GltfAnisotropy, GltfClearcoat, GltfDiffuseTransmission, GltfMaterial, GltfSheen, GltfSpecular,
+    GltfTransmission, GltfVolume,
+};
 pub use mtl::{MtlMap, MtlMaterial, MtlSlot};
 
 /// A material as its file describes it.
