@@ -6,7 +6,7 @@ use super::geometry::TrianglePoint;
 use crate::color::Rgb;
 use crate::disney::{Bsdf, Model, Parameter, Params};
 use crate::math::Frame;
-use crate::scene::material::{Material, NormalMap, Param, ShadingFrame, Sides, TextureChannel, TextureMap};
+use crate::scene::material::{Material, NormalMap, Param, ShadingFrame, Sides, TextureMap};
 use crate::scene::{Scene, texture::Texel};
 
 /// A material, prepared.
@@ -310,16 +310,7 @@ fn read_color(scene: &Scene, param: &Param<Rgb>, at: &TrianglePoint<'_>) -> Rgb 
 fn read_scalar(scene: &Scene, param: &Param<f32>, at: &TrianglePoint<'_>) -> f32 {
     match param {
         Param::Constant(value) => *value,
-        Param::Texture { map, factor } => {
-            let texel = read_texel(scene, map, at);
-            factor
-                * match map.channel {
-                    TextureChannel::R => texel.color.r,
-                    TextureChannel::G => texel.color.g,
-                    TextureChannel::B => texel.color.b,
-                    TextureChannel::A => texel.alpha,
-                }
-        }
+        Param::Texture { map, factor } => factor * map.channel.of(&read_texel(scene, map, at)),
     }
 }
 

@@ -11,6 +11,7 @@ mod material;
 mod medium;
 mod path;
 mod prepare;
+mod range;
 mod surface;
 
 use crate::accel::BuildError;
@@ -54,6 +55,22 @@ pub enum RenderError {
         name: String,
         /// What is wrong with it.
         why: &'static str,
+    },
+    /// A texture takes a parameter out of its range.
+    #[error("material {material:?}: {parameter} reads {found} from {image:?}, but must be in [{min}, {max}]")]
+    TextureRange {
+        /// The material.
+        material: String,
+        /// The parameter.
+        parameter: &'static str,
+        /// What the image holds, times the factor.
+        found: f32,
+        /// The image.
+        image: String,
+        /// The smallest legal value.
+        min: f32,
+        /// The largest.
+        max: f32,
     },
     /// A material emits more than a float holds.
     #[error("material {material:?}: its emission, colour times strength, is beyond what a float holds")]

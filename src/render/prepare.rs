@@ -8,6 +8,7 @@ use super::filter::FilterSampler;
 use super::geometry::Geometry;
 use super::material::PreparedMaterial;
 use super::medium::Medium;
+use super::range;
 use crate::light::{EmissiveTriangle, EnvironmentLight, Lights};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Camera, Named, Scene};
@@ -40,7 +41,7 @@ impl Prepared {
     /// Prepares `scene`, whose triangles `geometry` holds.
     ///
     /// # Errors
-    /// [`RenderError`] for settings out of range and missing or unusable cameras.
+    /// [`RenderError`] for settings and textures out of range and missing or unusable cameras.
     pub fn new(
         scene: Arc<Scene>,
         geometry: Arc<Geometry>,
@@ -49,6 +50,7 @@ impl Prepared {
         let camera = choose_camera(&scene, settings)?;
         let (width, height) = size_for(&camera.item, settings);
         check(settings, width, height)?;
+        range::check(&scene)?;
         let film_camera = FilmCamera::new(&camera.name, &camera.item, width, height)?;
         let materials: Vec<_> = scene.materials.iter().map(|m| PreparedMaterial::new(&m.item)).collect();
         for (material, prepared) in scene.materials.iter().zip(&materials) {

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::TextureId;
+use super::texture::Texel;
 use crate::color::Rgb;
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
 
@@ -169,6 +170,19 @@ pub enum TextureChannel {
     B,
     /// Alpha: 1 where the image has none.
     A,
+}
+
+impl TextureChannel {
+    /// This channel of a texel.
+    #[inline]
+    pub fn of(self, texel: &Texel) -> f32 {
+        match self {
+            Self::R => texel.color.r,
+            Self::G => texel.color.g,
+            Self::B => texel.color.b,
+            Self::A => texel.alpha,
+        }
+    }
 }
 
 /// Light that a surface sends out by itself: radiance = strength·color, the same in all directions.
