@@ -7,6 +7,7 @@ mod film;
 mod filter;
 mod geometry;
 mod material;
+mod offset;
 mod path;
 mod prepare;
 mod surface;
@@ -15,6 +16,7 @@ use crate::accel::BuildError;
 
 pub use film::{Control, Rendered, render};
 pub use geometry::Geometry;
+pub use offset::Departure;
 pub use path::{Replay, ReplayVertex, replay};
 pub use prepare::{Prepared, image_size};
 

@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 use super::Prepared;
-use super::surface::{Shading, Surface, offset};
+use super::offset::offset;
+use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::light::{LightPlace, LightSample};
@@ -95,7 +96,7 @@ pub(super) fn trace(
         if path.first.is_none() {
             path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
         }
-        inspect(ReplayVertex { point: surface.point.into(), radiance: path.radiance, beta });
+        inspect(ReplayVertex { point: (surface.point + scene.geometry.origin()).into(), radiance: path.radiance, beta });
         let Some(shading) = shading else { break };
         if scatterings == scene.settings.max_depth {
             break;
@@ -173,7 +174,7 @@ fn direct_light(
     let (arriving, w_light, shadow) = match sample.place {
         LightPlace::Surface { triangle, barycentric } => {
             let light = scene.geometry.point_on(triangle, barycentric);
-            let normal = light.geometric_normal();
+            let normal = light.geometric_normal().unwrap_or(-sample.wi);
             let material = scene.material_of(triangle);
             let coverage = material.alpha(&scene.scene, &light);
             let radiance = material.emitted(&scene.scene, &light, normal.dot(sample.wi) < 0.0) * coverage;

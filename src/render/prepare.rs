@@ -44,7 +44,7 @@ impl Prepared {
         let camera = choose_camera(&scene, settings)?;
         let (width, height) = size_for(&camera.item, settings);
         check(settings, width, height)?;
-        let film_camera = FilmCamera::new(&camera.name, &camera.item, width, height)?;
+        let film_camera = FilmCamera::new(&camera.name, &camera.item, geometry.origin(), width, height)?;
         let materials: Vec<_> = scene.materials.iter().map(|m| PreparedMaterial::new(&m.item)).collect();
         for (material, prepared) in scene.materials.iter().zip(&materials) {
             if prepared.mean_emission(&scene).is_some_and(|(radiance, _)| !radiance.is_finite()) {
@@ -180,7 +180,7 @@ fn collect_lights(scene: &Scene, geometry: &Geometry, materials: &[PreparedMater
             Some(EmissiveTriangle { triangle, vertices: geometry.vertices(triangle), mean_radiance, sides })
         })
         .collect();
-    let punctual: Vec<_> = scene.lights.iter().map(|l| l.item).collect();
+    let punctual: Vec<_> = scene.lights.iter().map(|l| l.item.relative_to(geometry.origin())).collect();
     let environment = scene.environment.as_ref().map(|e| {
         let image = match e.map {
             EnvironmentMap::Image { image, .. } => Some(&scene.images[image.0 as usize]),
