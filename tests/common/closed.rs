@@ -158,6 +158,11 @@ impl Closed {
         mesh
     }
 
+    /// A point well inside.
+    pub(crate) fn inside(&self, at: Placement) -> Vec3 {
+        (DVec3::X * f64::from(self.ring) * at.scale + at.center()).as_vec3()
+    }
+
     /// Shoots at least `rays` rays inside, along paths of up to 16 that leave surfaces as the renderer's do.
     pub(crate) fn shoot(&self, at: Placement, aim: Aim, rays: u64) -> Shots {
         let geometry = Geometry::build(&scene_of(self.placed(at))).expect("a tree");
