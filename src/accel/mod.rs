@@ -153,6 +153,29 @@ impl Bvh {
         })
     }
 
+    /// Calls `visitor` with the index of every triangle whose box touches the one between `low` and `high`.
+    pub fn visit_box(&self, low: Vec3, high: Vec3, mut visitor: impl FnMut(u32)) {
+        let touches = |min: Vec3, max: Vec3| min.cmple(high).all() && max.cmpge(low).all();
+        let mut pending = Pending::new();
+        pending.push((0, 0, 0.0));
+        while let Some((node, count, _)) = pending.pop() {
+            let (first, count) = (node as usize, count as usize);
+            for i in first..first + count {
+                let (min, max) = self.triangles[i].bounds();
+                if touches(min, max) {
+                    visitor(self.ids[i]);
+                }
+            }
+            if count == 0
+                && let Some(n) = self.nodes.get(first)
+            {
+                for k in (0..2).filter(|&k| touches(n.min[k], n.max[k])) {
+                    pending.push((n.child[k], n.count[k], 0.0));
+                }
+            }
+        }
+    }
+
     /// The number of triangles.
     pub fn len(&self) -> usize {
         self.triangles.len()

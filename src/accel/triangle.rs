@@ -11,6 +11,10 @@ pub(super) struct Triangle {
     vertices: [[f32; 3]; 3],
 }
 
+/// How far rounding may put the ray parameter off, in units of what it is made of (Pharr, Jakob and Humphreys 2023, section
+/// 6.8.7, gathered into one factor).
+const UNCERTAIN: f32 = 32.0 * f32::EPSILON;
+
 /// A ray in the space where it is the z axis: what all its triangle tests share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShearedRay {
@@ -57,6 +61,12 @@ impl Triangle {
         Self { vertices: vertices.map(|v| v.to_array()) }
     }
 
+    /// The corners of the box around it.
+    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
+        let [a, b, c] = self.vertices.map(Vec3::from);
+        (a.min(b).min(c), a.max(b).max(c))
+    }
+
     /// The ray parameter in (0, `t_max`) and the barycentric coordinates, if the ray hits either side.
     #[inline(always)]
     pub(super) fn intersect(&self, ray: &ShearedRay, t_max: f32) -> Option<(f32, [f32; 3])> {
@@ -68,13 +78,17 @@ impl Triangle {
         let mut v = ax * cy - ay * cx;
         let mut w = bx * ay - by * ax;
         if u == 0.0 || v == 0.0 || w == 0.0 {
-            // The difference of products may have underflowed or cancelled: f64 is exact here.
-            let edge = |px: f32, qy: f32, py: f32, qx: f32| {
+            // The difference of products may have underflowed or cancelled: f64 is exact here. Deviation: only those that are
+            // 0, or the neighbour across an edge that isn't, which sees nothing of this, might find the other sign for it.
+            let edge = |value: f32, px: f32, qy: f32, py: f32, qx: f32| {
+                if value != 0.0 {
+                    return value;
+                }
                 (f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx)) as f32
             };
-            u = edge(cx, by, cy, bx);
-            v = edge(ax, cy, ay, cx);
-            w = edge(bx, ay, by, ax);
+            u = edge(u, cx, by, cy, bx);
+            v = edge(v, ax, cy, ay, cx);
+            w = edge(w, bx, ay, by, ax);
         }
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
             return None;
@@ -86,11 +100,31 @@ impl Triangle {
         let scale = ray.shear[2];
         let t_scaled = u * (scale * az) + v * (scale * bz) + w * (scale * cz);
         let inverse = 1.0 / det;
-        let t = t_scaled * inverse;
+        let mut t = t_scaled * inverse;
+        // Near the origin, rounding could take one side of the plane for the other.
+        let largest = |a: f32, b: f32, c: f32| a.abs().max(b.abs()).max(c.abs());
+        let (x, y, z) = (largest(ax, bx, cx), largest(ay, by, cy), largest(az, bz, cz));
+        if t.abs() < UNCERTAIN * (x * y + z * (x + y)) * (z * scale * inverse).abs() {
+            t = self.exact_t(ray);
+        }
         // Also false for NaN.
         if !(t > 0.0 && t < t_max) {
             return None;
         }
         Some((t, [u * inverse, v * inverse, w * inverse]))
+    }
+
+    /// The ray parameter in f64, where differences and products of f32 coordinates are exact: its sign tells the side of the
+    /// plane that the origin is on.
+    #[cold]
+    fn exact_t(&self, ray: &ShearedRay) -> f32 {
+        let [a, b, c] = self.vertices.map(|p| {
+            let [x, y, z] = std::array::from_fn(|i| f64::from(p[ray.axes[i]]) - f64::from(ray.origin[i]));
+            let [sx, sy, _] = ray.shear.map(f64::from);
+            [x - sx * z, y - sy * z, z]
+        });
+        let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+        ((u * a[2] + v * b[2] + w * c[2]) / (u + v + w) * f64::from(ray.shear[2])) as f32
     }
 }

@@ -6,7 +6,7 @@ mod distribution;
 mod environment;
 mod punctual;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::color::Rgb;
 use crate::math::warp;
@@ -41,7 +41,12 @@ pub struct Lights {
 
 #[derive(Clone, Copy, Debug)]
 enum Emitter {
-    Triangle { triangle: u32, vertices: [Vec3; 3], area: f32 },
+    Triangle {
+        triangle: u32,
+        vertices: [Vec3; 3],
+        /// Along the normal, as long as the area.
+        area_vector: Vec3,
+    },
     Punctual(Light),
     Environment,
 }
@@ -95,14 +100,18 @@ impl Lights {
         let mut powers = Vec::new();
         let mut by_triangle = Vec::new();
         for t in triangles {
-            let area = triangle_area(t.vertices);
+            let area_vector = area_vector(t.vertices);
             let sides = if t.sides == Sides::Both { 2.0 } else { 1.0 };
             let power =
-                f64::from(t.mean_radiance.luminance()) * f64::from(area) * std::f64::consts::PI * sides;
+                f64::from(t.mean_radiance.luminance()) * area_vector.length() * std::f64::consts::PI * sides;
             // Coloured beyond Rec. 709 or not, what emits at all must have a chance.
             if power > 0.0 {
                 by_triangle.push((t.triangle, emitters.len() as u32));
-                emitters.push(Emitter::Triangle { triangle: t.triangle, vertices: t.vertices, area });
+                emitters.push(Emitter::Triangle {
+                    triangle: t.triangle,
+                    vertices: t.vertices,
+                    area_vector: area_vector.as_vec3(),
+                });
                 powers.push(power);
             }
         }
@@ -153,14 +162,14 @@ impl Lights {
     pub fn sample(&self, from: Vec3, u_light: f32, u: [f32; 2]) -> Option<LightSample> {
         let (index, probability) = self.selection.sample(u_light)?;
         match &self.emitters[index] {
-            Emitter::Triangle { triangle, vertices, area } => {
+            Emitter::Triangle { triangle, vertices, area_vector } => {
                 let [b1, b2] = warp::uniform_triangle(u);
                 let barycentric = [1.0 - b1 - b2, b1, b2];
                 let point = vertices[0] * barycentric[0] + vertices[1] * b1 + vertices[2] * b2;
                 let to_light = point - from;
                 let distance = to_light.length();
                 let wi = to_light / distance;
-                let pdf = probability * area_to_solid_angle(*vertices, *area, wi, distance)?;
+                let pdf = probability * area_to_solid_angle(*area_vector, wi, distance)?;
                 Some(LightSample { wi, place: LightPlace::Surface { triangle: *triangle, barycentric }, pdf })
             }
             Emitter::Punctual(light) => punctual::sample(light, from, probability),
@@ -179,9 +188,9 @@ impl Lights {
         let Ok(found) = self.by_triangle.binary_search_by_key(&triangle, |&(t, _)| t) else { return 0.0 };
         let index = self.by_triangle[found].1 as usize;
         match self.emitters[index] {
-            Emitter::Triangle { vertices, area, .. } => {
+            Emitter::Triangle { area_vector, .. } => {
                 self.selection.probability(index)
-                    * area_to_solid_angle(vertices, area, wi, distance).unwrap_or(0.0)
+                    * area_to_solid_angle(area_vector, wi, distance).unwrap_or(0.0)
             }
             Emitter::Punctual(_) | Emitter::Environment => 0.0,
         }
@@ -211,15 +220,16 @@ fn with_floor(powers: &[f64]) -> Vec<f64> {
 }
 
 /// 1/area as a density of directions: distance²/(area·cos). None where it isn't finite.
-fn area_to_solid_angle(vertices: [Vec3; 3], area: f32, wi: Vec3, distance: f32) -> Option<f32> {
-    let normal = (vertices[1] - vertices[0]).cross(vertices[2] - vertices[0]) / (2.0 * area);
-    let pdf = distance * distance / (area * normal.dot(wi).abs());
+fn area_to_solid_angle(area_vector: Vec3, wi: Vec3, distance: f32) -> Option<f32> {
+    let pdf = distance * distance / area_vector.dot(wi).abs();
     (pdf.is_finite() && pdf > 0.0).then_some(pdf)
 }
 
-/// The area of a triangle in m².
-fn triangle_area(v: [Vec3; 3]) -> f32 {
-    0.5 * (v[1] - v[0]).cross(v[2] - v[0]).length()
+/// The area of a triangle in m², along its normal. In f64, where the product of two tiny edges does not vanish, nor the difference
+/// of the products of two long ones of a needle.
+fn area_vector(v: [Vec3; 3]) -> DVec3 {
+    let [a, b, c] = v.map(|v| v.as_dvec3());
+    0.5 * (b - a).cross(c - a)
 }
 
 #[cfg(test)]

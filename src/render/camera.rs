@@ -22,7 +22,14 @@ pub(super) struct FilmCamera {
 }
 
 impl FilmCamera {
-    pub(super) fn new(name: &str, camera: &Camera, width: u32, height: u32) -> Result<Self, RenderError> {
+    /// `origin` is where in the world rays have the position 0.
+    pub(super) fn new(
+        name: &str,
+        camera: &Camera,
+        origin: Vec3,
+        width: u32,
+        height: u32,
+    ) -> Result<Self, RenderError> {
         let wrong = |why| Err(RenderError::Camera { name: name.to_owned(), why });
         let matrix = camera.world_from_camera.matrix3;
         if !camera.world_from_camera.is_finite() || matrix.determinant() == 0.0 {
@@ -47,8 +54,10 @@ impl FilmCamera {
         if camera.lens.is_some_and(|l| !(l.focal_distance > 0.0 && l.radius >= 0.0)) {
             return wrong("its focal distance must be above 0 and its lens radius not below 0");
         }
+        let mut world_from_camera = camera.world_from_camera;
+        world_from_camera.translation -= glam::Vec3A::from(origin);
         Ok(Self {
-            world_from_camera: camera.world_from_camera,
+            world_from_camera,
             axis: Vec3::from(-matrix.z_axis).normalize(),
             per_pixel,
             half_size,
@@ -98,10 +107,10 @@ mod tests {
     #[test]
     fn edges_of_the_film_see_half_the_angle_of_view() {
         let fov = std::f32::consts::FRAC_PI_2;
-        let film = FilmCamera::new("c", &camera(fov, FovAxis::Y), 200, 100).unwrap();
+        let film = FilmCamera::new("c", &camera(fov, FovAxis::Y), Vec3::ZERO, 200, 100).unwrap();
         let top = film.ray(Vec2::new(100.0, 0.0), [0.5; 2]).direction;
         assert!((top - Vec3::new(0.0, 1.0, -1.0).normalize()).length() < 1e-6);
-        let film = FilmCamera::new("c", &camera(fov, FovAxis::X), 200, 100).unwrap();
+        let film = FilmCamera::new("c", &camera(fov, FovAxis::X), Vec3::ZERO, 200, 100).unwrap();
         let right = film.ray(Vec2::new(200.0, 50.0), [0.5; 2]).direction;
         assert!((right - Vec3::new(1.0, 0.0, -1.0).normalize()).length() < 1e-6);
     }
@@ -111,7 +120,7 @@ mod tests {
         for shape in [Aperture::Disk, Aperture::Square] {
             let mut c = camera(0.6, FovAxis::Y);
             c.lens = Some(Lens { radius: 0.2, focal_distance: 3.0, shape });
-            let film = FilmCamera::new("c", &c, 64, 48).unwrap();
+            let film = FilmCamera::new("c", &c, Vec3::ZERO, 64, 48).unwrap();
             let at_focus = |u| {
                 let ray = film.ray(Vec2::new(10.0, 7.0), u);
                 ray.origin + ray.direction * (-3.0 - ray.origin.z) / ray.direction.z
@@ -123,10 +132,10 @@ mod tests {
     #[test]
     fn unusable_cameras_are_refused() {
         for fov in [0.0, -1.0, 3.2, f32::NAN] {
-            assert!(FilmCamera::new("c", &camera(fov, FovAxis::Y), 4, 4).is_err());
+            assert!(FilmCamera::new("c", &camera(fov, FovAxis::Y), Vec3::ZERO, 4, 4).is_err());
         }
         let mut flat = camera(0.6, FovAxis::Y);
         flat.world_from_camera.matrix3.x_axis = glam::Vec3A::ZERO;
-        assert!(FilmCamera::new("c", &flat, 4, 4).is_err());
+        assert!(FilmCamera::new("c", &flat, Vec3::ZERO, 4, 4).is_err());
     }
 }

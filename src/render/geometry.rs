@@ -1,18 +1,23 @@
 //! All triangles of a scene in world space, with the way back from a triangle to its mesh.
 
-use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
+use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
 use super::RenderError;
-use crate::accel::{Bvh, Hit};
+use super::offset::Departure;
+use crate::accel::{Bvh, Hit, Ray};
 use crate::scene::{MaterialId, Mesh, Scene};
 
 /// The triangles of a scene and the tree over them. It depends on meshes and instances alone, so that jobs that differ in
 /// materials, lights or camera share it.
+///
+/// Floats are fine near 0 and coarse far away: 1/16 m at 1000 km. A scene that lies far from the origin for its size is rendered
+/// around its own centre, [`Self::origin`], to which all positions in here are relative.
 #[derive(Debug)]
 pub struct Geometry {
     pub(super) bvh: Bvh,
-    /// World positions, by triangle.
+    origin: Vec3,
+    /// Positions relative to `origin`, by triangle.
     vertices: Vec<[Vec3; 3]>,
     /// The instance and the triangle's index in its mesh.
     origins: Vec<(u32, u32)>,
@@ -50,11 +55,22 @@ impl Geometry {
         let mut vertices = Vec::with_capacity(count);
         let mut origins = Vec::with_capacity(count);
         let mut instances = Vec::with_capacity(scene.instances.len());
+        let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
+        let center = low * 0.5 + high * 0.5;
+        let radius = radius_of(high - center);
+        let origin = if center.abs().max_element() > FAR * radius { center } else { Vec3::ZERO };
         for (i, instance) in scene.instances.iter().enumerate() {
             let mesh = &scene.meshes[instance.mesh.0 as usize];
             let to_world = instance.world_from_object;
+            let place = |p: Vec3| {
+                if origin == Vec3::ZERO {
+                    to_world.transform_point3(p)
+                } else {
+                    placed_from(origin, &to_world, p)
+                }
+            };
             for (k, corners) in mesh.triangles.iter().enumerate() {
-                vertices.push(corners.map(|c| to_world.transform_point3(mesh.positions[c as usize])));
+                vertices.push(corners.map(|c| place(mesh.positions[c as usize])));
                 origins.push((i as u32, k as u32));
             }
             instances.push(PlacedMesh {
@@ -64,20 +80,32 @@ impl Geometry {
                 handedness: if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
             });
         }
-        let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
-        let center = low * 0.5 + high * 0.5;
-        Ok(Self {
-            bvh: Bvh::build(&vertices)?,
-            vertices,
-            origins,
-            instances,
-            radius: radius_of(high - center),
-        })
+        Ok(Self { bvh: Bvh::build(&vertices)?, origin, vertices, origins, instances, radius })
+    }
+
+    /// Where in the world the positions of rays and hits are 0.
+    pub fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
+    /// What a ray meets first.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.bvh.closest(ray)
+    }
+
+    /// From where paths go on that `incoming`, of unit direction, brought to `hit`.
+    pub fn departure(&self, incoming: &Ray, hit: &Hit) -> Departure {
+        self.at(hit).departure(self, incoming, hit)
     }
 
     /// The number of triangles, instances counted.
     pub fn triangle_count(&self) -> usize {
         self.vertices.len()
+    }
+
+    /// -1 where a triangle's front is on the other side than its winding says.
+    pub(super) fn handedness(&self, triangle: u32) -> f32 {
+        self.instances[self.instance_of(triangle)].handedness
     }
 
     /// The instance of a triangle.
@@ -118,6 +146,18 @@ impl Geometry {
     }
 }
 
+/// A scene lies far from the origin if its centre is more than this many of its radii away along an axis.
+const FAR: f32 = 8.0;
+
+/// A mesh's point relative to `origin`: in f64, so that what the sum of large numbers would lose is kept.
+fn placed_from(origin: Vec3, to_world: &Affine3A, p: Vec3) -> Vec3 {
+    let to_world = DAffine3::from_mat3_translation(
+        glam::Mat3::from(to_world.matrix3).as_dmat3(),
+        Vec3::from(to_world.translation).as_dvec3() - origin.as_dvec3(),
+    );
+    to_world.transform_point3(p.as_dvec3()).as_vec3()
+}
+
 /// The length of a box's half diagonal as a finite number above 0, whatever the scale.
 fn radius_of(half_diagonal: Vec3) -> f32 {
     let length = half_diagonal.as_dvec3().length();
@@ -125,27 +165,54 @@ fn radius_of(half_diagonal: Vec3) -> f32 {
 }
 
 impl TrianglePoint<'_> {
-    /// The world position, and how far from the plane of its triangle rounding may put it, or make a ray meet the plane of a
-    /// neighbour: some ulps of the position itself, and of the corners' distance from it, which is all that the intersection
-    /// test computes with.
+    /// The position, and a bound of how far rays must stay from the plane of its triangle: see the room `offset`.
     #[inline]
     pub(super) fn position(&self) -> (Vec3, f32) {
-        const UNIT: f32 = f32::EPSILON * 0.5;
         let [a, b, c] = self.world;
         let (e1, e2) = (b - a, c - a);
         let point = a + (e1 * self.barycentric[1] + e2 * self.barycentric[2]);
-        let extent = e1.abs().max(e2.abs()).max_element();
-        (point, 3.0 * UNIT * point.abs().max_element() + 16.0 * UNIT * extent)
+        let extent = e1.abs().max(e2.abs()).max((e2 - e1).abs()).max_element();
+        (point, super::offset::bound(point, extent))
     }
 
-    /// The unit geometric normal of the front side.
+    /// The unit geometric normal of the front side, right to the last digits even for needles: in f64 the differences and products
+    /// of f32 coordinates are exact. None where the triangle has no area.
     #[inline]
-    pub(super) fn geometric_normal(&self) -> Vec3 {
+    pub(super) fn geometric_normal(&self) -> Option<Vec3> {
+        let n = self.area_vector().try_normalize()?;
+        Some(n.as_vec3() * self.placed.handedness)
+    }
+
+    /// Twice the area, along the normal of the winding.
+    #[inline]
+    fn area_vector(&self) -> DVec3 {
+        let [a, b, c] = self.world.map(|v| v.as_dvec3());
+        (b - a).cross(c - a)
+    }
+
+    /// From where rays leave the point that `incoming` hit.
+    #[inline]
+    pub(super) fn departure(&self, geometry: &Geometry, incoming: &Ray, hit: &Hit) -> Departure {
+        let (point, error) = self.position();
         let [a, b, c] = self.world;
-        let (e1, e2) = (b - a, c - a);
-        // Scaled first: the product of two tiny edges would underflow.
-        let scale = e1.abs().max_element().max(e2.abs().max_element());
-        (e1 / scale).cross(e2 / scale).normalize_or(Vec3::Z) * self.placed.handedness
+        let [opposite_a, opposite_b, opposite_c] = [c - b, c - a, b - a].map(Vec3::length);
+        let longest = opposite_a.max(opposite_b).max(opposite_c);
+        let area_vector = self.area_vector();
+        let area = area_vector.length() as f32;
+        // A triangle thinner than rounding moves its corners has no plane to speak of: any normal is right that faces the viewer.
+        let has_plane = area > super::offset::THINNEST * error * longest;
+        let normal = match area_vector.try_normalize() {
+            Some(n) if has_plane => n.as_vec3() * self.placed.handedness,
+            _ => -incoming.direction,
+        };
+        let mut departure = Departure::new(hit.triangle, point, error, normal, incoming);
+        // A barycentric coordinate is the distance from an edge in heights above it.
+        let [b0, b1, b2] = self.barycentric.map(|b| b * area);
+        let near = super::offset::NEAR * error;
+        if b0 <= near * opposite_a || b1 <= near * opposite_b || b2 <= near * opposite_c {
+            departure.keep_clear(geometry, has_plane);
+        }
+        departure
     }
 
     /// The unit shading normal, on the front side: interpolated, or the geometric one where the mesh has none.

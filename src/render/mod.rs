@@ -9,6 +9,7 @@ mod geometry;
 mod mapped_normal;
 mod material;
 mod medium;
+mod offset;
 mod path;
 mod prepare;
 mod range;
@@ -18,6 +19,7 @@ use crate::accel::BuildError;
 
 pub use film::{Control, Rendered, render};
 pub use geometry::Geometry;
+pub use offset::Departure;
 pub use path::{Replay, ReplayVertex, replay};
 pub use prepare::{Prepared, image_size};
 

@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use super::Prepared;
 use super::medium::{self, Medium};
-use super::surface::{Shading, Surface, offset};
+use super::offset::offset;
+use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::disney::Lobe;
@@ -102,7 +103,11 @@ pub(super) fn trace(
         if path.first.is_none() {
             path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
         }
-        inspect(ReplayVertex { point: surface.point.into(), radiance: path.radiance, beta });
+        inspect(ReplayVertex {
+            point: (surface.point + scene.geometry.origin()).into(),
+            radiance: path.radiance,
+            beta,
+        });
         let Some(shading) = shading else { break };
         if scatterings == scene.settings.max_depth {
             // Going straight through a clear sheet is no scattering: shadow rays do it too.
@@ -195,7 +200,7 @@ fn direct_light(
     let (arriving, w_light, shadow) = match sample.place {
         LightPlace::Surface { triangle, barycentric } => {
             let light = scene.geometry.point_on(triangle, barycentric);
-            let normal = light.geometric_normal();
+            let normal = light.geometric_normal().unwrap_or(-sample.wi);
             let material = scene.material_of(triangle);
             let coverage = material.alpha(&scene.scene, &light);
             let radiance = material.emitted(&scene.scene, &light, normal.dot(sample.wi) < 0.0) * coverage;

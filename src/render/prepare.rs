@@ -51,7 +51,7 @@ impl Prepared {
         let (width, height) = size_for(&camera.item, settings);
         check(settings, width, height)?;
         range::check(&scene)?;
-        let film_camera = FilmCamera::new(&camera.name, &camera.item, width, height)?;
+        let film_camera = FilmCamera::new(&camera.name, &camera.item, geometry.origin(), width, height)?;
         let materials: Vec<_> = scene.materials.iter().map(|m| PreparedMaterial::new(&m.item)).collect();
         for (material, prepared) in scene.materials.iter().zip(&materials) {
             if prepared.mean_emission(&scene).is_some_and(|(radiance, _)| !radiance.is_finite()) {
@@ -166,7 +166,7 @@ fn medium_around<'a>(
 ) -> Medium {
     let ray = camera.axis_ray();
     let hit = geometry.bvh.closest_where(&ray, |hit| material_of(hit.triangle).is_interface)?;
-    let is_behind = geometry.at(&hit).geometric_normal().dot(ray.direction) > 0.0;
+    let is_behind = geometry.at(&hit).geometric_normal().is_some_and(|n| n.dot(ray.direction) > 0.0);
     material_of(hit.triangle).absorption.filter(|_| is_behind)
 }
 
@@ -210,7 +210,7 @@ fn collect_lights(scene: &Scene, geometry: &Geometry, materials: &[PreparedMater
             Some(EmissiveTriangle { triangle, vertices: geometry.vertices(triangle), mean_radiance, sides })
         })
         .collect();
-    let punctual: Vec<_> = scene.lights.iter().map(|l| l.item).collect();
+    let punctual: Vec<_> = scene.lights.iter().map(|l| l.item.relative_to(geometry.origin())).collect();
     let environment = scene.environment.as_ref().map(|e| {
         let image = match e.map {
             EnvironmentMap::Image { image, .. } => Some(&scene.images[image.0 as usize]),

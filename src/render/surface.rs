@@ -7,6 +7,7 @@ use super::geometry::TrianglePoint;
 use super::mapped_normal::keep_reflection_above;
 use super::material::PreparedMaterial;
 use super::medium::Medium;
+use super::offset::Departure;
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::disney::Bsdf;
@@ -19,8 +20,7 @@ pub(super) struct Surface<'a> {
     pub(super) material: &'a PreparedMaterial,
     pub(super) triangle: u32,
     pub(super) point: Vec3,
-    /// How far `point` must be moved off the surface for a ray to leave it.
-    error: f32,
+    departure: Departure,
     /// The geometric normal of the front side.
     normal: Vec3,
     /// Unit direction to where the path came from.
@@ -42,8 +42,8 @@ impl<'a> Surface<'a> {
     #[inline]
     pub(super) fn new(scene: &'a Prepared, ray: &Ray, hit: &Hit) -> Self {
         let at = scene.geometry.at(hit);
-        let (point, error) = at.position();
-        let normal = at.geometric_normal();
+        let departure = at.departure(&scene.geometry, ray, hit);
+        let (point, normal) = (departure.point, departure.normal);
         let wo = -ray.direction;
         let material = scene.material_of(hit.triangle);
         Self {
@@ -51,7 +51,7 @@ impl<'a> Surface<'a> {
             material,
             triangle: hit.triangle,
             point,
-            error,
+            departure,
             normal,
             wo,
             is_front: wo.dot(normal) >= 0.0,
@@ -124,8 +124,7 @@ impl<'a> Surface<'a> {
     /// A ray from here that can't meet its own surface again, nor what lies in the same plane.
     #[inline]
     pub(super) fn leave(&self, direction: Vec3) -> Ray {
-        let origin = offset(self.point, self.error, self.normal, direction);
-        Ray { source: Some(self.triangle), ..Ray::new(origin, direction) }
+        self.departure.ray(direction)
     }
 
     /// The ray to a point of a light, ending just before it.
@@ -140,21 +139,3 @@ impl<'a> Surface<'a> {
 
 /// Rays to lights end this much before them, in fractions of the distance.
 const BEFORE_LIGHT: f32 = 1.0 - 1.0 / 65536.0;
-
-/// `point` moved off its surface, to the side of `direction`, by its error and at least to the next float: right at every scale
-/// and distance from the origin, without a constant in metres.
-#[inline]
-pub(super) fn offset(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> Vec3 {
-    let shift = if direction.dot(normal) < 0.0 { normal * -error } else { normal * error };
-    let moved = point + shift;
-    let away = |moved: f32, shift: f32| {
-        if shift > 0.0 {
-            moved.next_up()
-        } else if shift < 0.0 {
-            moved.next_down()
-        } else {
-            moved
-        }
-    };
-    Vec3::new(away(moved.x, shift.x), away(moved.y, shift.y), away(moved.z, shift.z))
-}

@@ -44,3 +44,15 @@ pub enum LightKind {
         direction: Vec3,
     },
 }
+
+impl Light {
+    /// The light where positions are relative to `origin`.
+    #[must_use]
+    pub fn relative_to(mut self, origin: Vec3) -> Self {
+        match &mut self.kind {
+            LightKind::Point { position, .. } | LightKind::Spot { position, .. } => *position -= origin,
+            LightKind::Directional { .. } => {}
+        }
+        self
+    }
+}

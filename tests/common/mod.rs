@@ -1,6 +1,8 @@
 //! Scenes that tests build by hand.
 #![allow(dead_code, reason = "every test binary uses its own part")]
 
+pub(crate) mod closed;
+
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};

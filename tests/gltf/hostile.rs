@@ -251,3 +251,36 @@ fn what_only_an_unread_extension_holds_is_named() {
     let error = error_of(&basisu);
     assert!(matches!(&error, GltfError::Extension { extension: "KHR_texture_basisu", .. }), "{error}");
 }
+
+#[test]
+fn attributes_that_are_no_numbers_are_mended_and_counted() {
+    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    let cases: [(&str, &str, &[f32], &str); 4] = [
+        (
+            "NORMAL",
+            "VEC3",
+            &[0., 0., 1., nan, 0., 1., 0., inf, 0., 0., 0., 0.],
+            "3 normals without a direction",
+        ),
+        ("TEXCOORD_0", "VEC2", &[0., 1., nan, 1., 1., inf, 0., 0.], "2 texture coordinates"),
+        ("COLOR_0", "VEC3", &[nan, 0., 0., inf, 1., 1., -inf, 0., 0., 1., 1., 1.], "3 vertex colours"),
+        (
+            "TANGENT",
+            "VEC4",
+            &[nan, 0., 0., 1., 1., 0., 0., 1., 1., 0., 0., inf, 1., 0., 0., 1.],
+            "2 tangents",
+        ),
+    ];
+    for (attribute, kind, values, told) in cases {
+        let bytes = minimal(|json, bin| {
+            json["meshes"][0]["primitives"][0]["attributes"][attribute] = json!(bin.floats(kind, values));
+        });
+        let imported = read("nan.glb", &bytes).unwrap();
+        let mesh = &imported.scene.meshes[0];
+        assert!(mesh.normals.iter().all(|n| n.is_finite()), "{attribute}");
+        assert!(mesh.tangents.iter().chain(&mesh.colors).all(|v| v.is_finite()), "{attribute}");
+        assert!(mesh.uvs.iter().flatten().all(|uv| uv.is_finite()), "{attribute}");
+        let warnings: Vec<String> = imported.warnings.iter().map(ToString::to_string).collect();
+        assert!(warnings.iter().any(|w| w.contains(told)), "{attribute}: {warnings:?}");
+    }
+}

@@ -1,0 +1,192 @@
+//! How rays leave surfaces: without meeting them again, and without slipping past a neighbour.
+//!
+//! # The bound
+//!
+//! A hit's point is computed as a + (e₁b₁ + e₂b₂), with e₁ = b - a and e₂ = c - a (Pharr, Jakob and Humphreys 2023, section 6.8,
+//! whose world transform has no part in it: world vertices are floats by definition). With u = 2⁻²⁴, differences, products and the
+//! inner sum are three roundings of at most extent = max |edge| (b₁, b₂ ≥ 0 sum to 1), and the outer sum is one of |point|: each
+//! coordinate is off by at most u·|point| + 3u·extent, however wrong the barycentric coordinates are, since that moves the point
+//! within the plane. Along a unit normal, whose components sum to at most √3, that makes 1.74 u·|point| + 5.2 u·extent.
+//!
+//! To that the bound adds
+//! - once more 1.74 u·|point|: the plane of a coincident face has corners that were rounded on their own;
+//! - 4.3 u·extent: a ray from the new origin computes with the corners' distances from it, a difference, a product and a
+//!   difference again in each of two coordinates, and must tell on which side of an edge it passes.
+//!
+//! The sign of a ray parameter near 0 is exact ([`crate::accel`]), and the triangle itself is left out by its index. So a ray that
+//! starts beyond the bound meets neither the surface it leaves nor what lies in the same plane, at every scale and without a
+//! constant in metres.
+//!
+//! # Edges
+//!
+//! Near an edge, the bound along one face's normal does not keep the ray off the other face: where they meet at a right angle, it
+//! moves along it. There the origin is pushed from every plane nearby, to the side that the ray came from, whose origin was itself
+//! so placed. Then no path leaves a closed mesh, whatever the shape of its triangles.
+
+use glam::{DVec3, Vec3};
+
+use super::geometry::Geometry;
+use crate::accel::Ray;
+
+/// The bound for a point of a triangle whose longest edge, by its largest coordinate, is `extent`.
+#[inline]
+pub(super) fn bound(point: Vec3, extent: f32) -> f32 {
+    const UNIT: f32 = f32::EPSILON * 0.5;
+    4.0 * UNIT * point.abs().max_element() + 12.0 * UNIT * extent
+}
+
+/// An edge closer than so many bounds is near: two faces may meet at 15° before the bound above one of them is behind the other
+/// farther from their edge.
+pub(super) const NEAR: f32 = 4.0;
+
+/// A triangle lower than this fraction of the bound has no plane to speak of: the rounding of its corners turns it about its edge.
+pub(super) const THINNEST: f32 = 0.5;
+
+/// Rounds of pushing, and by how much each goes beyond what is missing: in an acute corner one face's push undoes another's in part.
+const ROUNDS: usize = 32;
+const RELAXATION: f64 = 1.5;
+
+/// `point` moved off its surface, to the side of `direction`, by its error and at least to the next float.
+#[inline]
+pub(super) fn offset(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> Vec3 {
+    let shift = if direction.dot(normal) < 0.0 { normal * -error } else { normal * error };
+    let moved = point + shift;
+    let away = |moved: f32, shift: f32| {
+        if shift > 0.0 {
+            moved.next_up()
+        } else if shift < 0.0 {
+            moved.next_down()
+        } else {
+            moved
+        }
+    };
+    Vec3::new(away(moved.x, shift.x), away(moved.y, shift.y), away(moved.z, shift.z))
+}
+
+/// A hit point, and where rays start that leave it.
+#[derive(Clone, Copy, Debug)]
+pub struct Departure {
+    triangle: u32,
+    pub(super) point: Vec3,
+    /// How far `point` must be moved off the surface for a ray to leave it.
+    error: f32,
+    /// The geometric normal of the front side.
+    pub(super) normal: Vec3,
+    /// Where the incoming ray started.
+    came_from: Vec3,
+    /// Where rays start that leave to the side of the incoming one.
+    this_side: Vec3,
+    is_front: bool,
+}
+
+impl Departure {
+    #[inline]
+    pub(super) fn new(triangle: u32, point: Vec3, error: f32, normal: Vec3, incoming: &Ray) -> Self {
+        let this_side = offset(point, error, normal, -incoming.direction);
+        let is_front = incoming.direction.dot(normal) <= 0.0;
+        Self { triangle, point, error, normal, came_from: incoming.origin, this_side, is_front }
+    }
+
+    /// The unit geometric normal of the front side, or towards the viewer where the triangle is too thin to have one.
+    pub fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    /// The ray in `direction`.
+    #[inline]
+    pub fn ray(&self, direction: Vec3) -> Ray {
+        let cos = direction.dot(self.normal);
+        // Along the plane there is no other side to go to.
+        let crosses = if self.is_front { cos < 0.0 } else { cos > 0.0 };
+        let origin =
+            if crosses { offset(self.point, self.error, self.normal, direction) } else { self.this_side };
+        self.ray_from(origin, direction)
+    }
+
+    /// Moves the origin of this side's rays off all triangles nearby; `has_plane` tells whether that of the one that was hit can be
+    /// trusted.
+    ///
+    /// For light that goes through there is no ray that knows the other side: it starts off its own triangle alone.
+    #[cold]
+    pub(super) fn keep_clear(&mut self, geometry: &Geometry, has_plane: bool) {
+        let clearance = f64::from(self.error);
+        let reach = Vec3::splat(2.0 * NEAR * self.error);
+        let from = self.came_from.as_dvec3();
+        let mut faces = Vec::new();
+        geometry.bvh.visit_box(self.point - reach, self.point + reach, |t| {
+            let Some(face) = Face::new(geometry.vertices(t).map(|v| v.as_dvec3()), from, clearance) else {
+                return;
+            };
+            // What shows its other side lies behind a ridge.
+            let is_front = face.shows_winding == (geometry.handedness(t) > 0.0);
+            if t == self.triangle || !has_plane || is_front == self.is_front {
+                faces.push(face);
+            }
+        });
+        let mut origin = self.this_side.as_dvec3();
+        for _ in 0..ROUNDS {
+            let mut is_clear = true;
+            for face in &faces {
+                if let Some(push) = face.push_off(origin, clearance) {
+                    origin += push;
+                    is_clear = false;
+                }
+            }
+            if is_clear {
+                break;
+            }
+        }
+        self.this_side = origin.as_vec3();
+        // Among triangles as thin as their own rounding no plane is certain, but the incoming ray was free.
+        let back = self.came_from - self.point;
+        let mut fraction = 4.0 * self.error / back.length();
+        while fraction < 1.0 && self.is_cut_off(geometry) {
+            self.this_side = self.point + back * fraction;
+            fraction *= 4.0;
+        }
+    }
+
+    /// Whether something lies between the origin of rays and that of the incoming one, nearer to here.
+    fn is_cut_off(&self, geometry: &Geometry) -> bool {
+        let mut ray = self.ray_from(self.this_side, self.came_from - self.this_side);
+        ray.t_max = 0.5;
+        geometry.bvh.occluded(&ray)
+    }
+
+    fn ray_from(&self, origin: Vec3, direction: Vec3) -> Ray {
+        Ray { source: Some(self.triangle), ..Ray::new(origin, direction) }
+    }
+}
+
+/// A triangle with its unit normal on the side that is seen.
+struct Face {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    shows_winding: bool,
+}
+
+impl Face {
+    /// None for triangles without a plane to speak of, or seen edge-on.
+    fn new([a, b, c]: [DVec3; 3], from: DVec3, clearance: f64) -> Option<Self> {
+        let area_vector = (b - a).cross(c - a);
+        let longest = (b - a).length().max((c - a).length()).max((c - b).length());
+        let area = area_vector.length();
+        let side = area_vector.dot(from - a);
+        let normal = area_vector / area.copysign(side);
+        let has_plane = area > f64::from(THINNEST) * clearance * longest && side != 0.0;
+        has_plane.then_some(Self { corners: [a, b, c], normal, shows_winding: side > 0.0 })
+    }
+
+    /// The push that brings `origin` more than `clearance` off the plane; none if it is there already, or not over the triangle.
+    fn push_off(&self, origin: DVec3, clearance: f64) -> Option<DVec3> {
+        let [a, b, c] = self.corners;
+        let missing = clearance - self.normal.dot(origin - a);
+        let winding = if self.shows_winding { self.normal } else { -self.normal };
+        let is_over = |p: DVec3, q: DVec3| {
+            let inward = winding.cross(q - p);
+            inward.dot(origin - p) > -0.99 * clearance * inward.length()
+        };
+        let near = missing > 0.0 && is_over(a, b) && is_over(b, c) && is_over(c, a);
+        near.then(|| self.normal * (missing * RELAXATION))
+    }
+}
