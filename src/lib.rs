@@ -38,6 +38,9 @@
 //! | 1 | [`disney`], [`raster`], [`settings`] |
 //! | 0 | [`math`], and above it [`color`] |
 
+#[macro_use]
+mod named;
+
 pub mod accel;
 pub mod check;
 pub mod cli;

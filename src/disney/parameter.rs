@@ -184,25 +184,7 @@ pub enum Model {
     Dielectric,
 }
 
-impl Model {
-    /// All models.
-    pub const ALL: [Self; 4] = [Self::Disney, Self::Diffuse, Self::Mirror, Self::Dielectric];
-
-    /// The name in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Disney => "disney",
-            Self::Diffuse => "diffuse",
-            Self::Mirror => "mirror",
-            Self::Dielectric => "dielectric",
-        }
-    }
-
-    /// The model of that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|m| m.name() == name)
-    }
-}
+named_variants! { Model { Disney "disney", Diffuse "diffuse", Mirror "mirror", Dielectric "dielectric", } }
 
 /// The roughness that the masking-shadowing term G of the specular lobe uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -214,6 +196,8 @@ pub enum Masking {
     /// Roughness replaced by 0.5 + roughness/2, as the 2012 report and Aris.
     Remapped,
 }
+
+named_variants! { Masking { Matched "matched", Remapped "remapped", } }
 
 /// The diffuse term of the Disney model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -227,6 +211,8 @@ pub enum DiffuseModel {
     /// base_color/π · (1 - F), F the specular lobe's Fresnel term: glTF's own.
     LambertFresnel,
 }
+
+named_variants! { DiffuseModel { Burley "burley", Lambert "lambert", LambertFresnel "lambert_fresnel", } }
 
 /// The parameters at one point of a surface, in range.
 #[derive(Clone, Copy, Debug, PartialEq)]

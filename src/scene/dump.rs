@@ -9,12 +9,12 @@ use glam::{Affine2, Affine3A, Vec3};
 use super::camera::{Aperture, FovAxis, Projection};
 use super::environment::{EnvironmentMap, Equirectangular};
 use super::light::LightKind;
-use super::material::{Param, ShadingFrame, Sides, TextureChannel, TextureMap};
+use super::material::{Param, Sides, TextureMap};
 use super::source::SourceMaterial;
-use super::texture::{Encoding, Pixels, TexelFilter, Wrap};
+use super::texture::{Pixels, Wrap};
 use super::{Camera, Light, Material, Mesh, Scene};
 use crate::color::Rgb;
-use crate::disney::{DiffuseModel, Masking, Parameter};
+use crate::disney::Parameter;
 
 impl Scene<Material> {
     /// The scene as stable text.
@@ -67,20 +67,8 @@ fn write_scene<M>(
     }
     writeln!(out, "textures: {}", scene.textures.len())?;
     for (i, t) in scene.textures.iter().enumerate() {
-        let encoding = match t.encoding {
-            Encoding::Linear => "linear",
-            Encoding::Srgb => "srgb",
-        };
-        let wrap = t.wrap.map(|w| match w {
-            Wrap::Repeat => "repeat",
-            Wrap::Mirror => "mirror",
-            Wrap::Clamp => "clamp",
-        });
-        let filter = match t.filter {
-            TexelFilter::Bilinear => "bilinear",
-            TexelFilter::Nearest => "nearest",
-        };
-        writeln!(out, "  {i}: image {}, {encoding}, {} {}, {filter}", t.image.0, wrap[0], wrap[1])?;
+        let (encoding, [u, v], filter) = (t.encoding.name(), t.wrap.map(Wrap::name), t.filter.name());
+        writeln!(out, "  {i}: image {}, {encoding}, {u} {v}, {filter}", t.image.0)?;
     }
     writeln!(out, "images: {}", scene.images.len())?;
     for (i, image) in scene.images.iter().enumerate() {
@@ -163,15 +151,8 @@ fn dump_material(out: &mut String, m: &Material) -> fmt::Result {
         let text = || param(value, |v| v.to_string(), Reading::Scalar);
         line(p.name(), value != default.scalar(p), &text);
     }
-    line("masking", m.masking != default.masking, &|| match m.masking {
-        Masking::Matched => "matched".into(),
-        Masking::Remapped => "remapped".into(),
-    });
-    line("diffuse", m.diffuse != default.diffuse, &|| match m.diffuse {
-        DiffuseModel::Burley => "burley".into(),
-        DiffuseModel::Lambert => "lambert".into(),
-        DiffuseModel::LambertFresnel => "lambert_fresnel".into(),
-    });
+    line("masking", m.masking != default.masking, &|| m.masking.name().into());
+    line("diffuse", m.diffuse != default.diffuse, &|| m.diffuse.name().into());
     for (name, color) in
         [("transmission_color", &m.transmission_color), ("diff_trans_color", &m.diff_trans_color)]
     {
@@ -192,10 +173,7 @@ fn dump_material(out: &mut String, m: &Material) -> fmt::Result {
     if let Some(n) = &m.normal_map {
         line("normal_map", true, &|| format!("{}, scale {}", map(&n.map, Reading::Color), n.scale));
     }
-    line("frame", m.frame != default.frame, &|| match m.frame {
-        ShadingFrame::Surface => "surface".into(),
-        ShadingFrame::Nori => "nori".into(),
-    });
+    line("frame", m.frame != default.frame, &|| m.frame.name().into());
     line("rotation", m.rotation != default.rotation, &|| m.rotation.to_string());
     line("sides", m.sides != default.sides, &|| sides(m.sides).into());
     line("vertex_color", m.vertex_color != default.vertex_color, &|| m.vertex_color.to_string());
@@ -218,12 +196,9 @@ fn param<T: Copy>(param: &Param<T>, text: impl Fn(T) -> String, reading: Reading
 }
 
 fn map(map: &TextureMap, reading: Reading) -> String {
-    let channel = match (reading, map.channel) {
-        (Reading::Color, _) => "",
-        (Reading::Scalar, TextureChannel::R) => ".r",
-        (Reading::Scalar, TextureChannel::G) => ".g",
-        (Reading::Scalar, TextureChannel::B) => ".b",
-        (Reading::Scalar, TextureChannel::A) => ".a",
+    let channel = match reading {
+        Reading::Color => String::new(),
+        Reading::Scalar => format!(".{}", map.channel.name()),
     };
     let mut text = format!("texture {}{channel}", map.texture.0);
     if map.uv_set != 0 {

@@ -172,6 +172,8 @@ pub enum TextureChannel {
     A,
 }
 
+named_variants! { TextureChannel { R "r", G "g", B "b", A "a", } }
+
 impl TextureChannel {
     /// This channel of a texel.
     #[inline]
@@ -236,6 +238,8 @@ pub enum ShadingFrame {
     Nori,
 }
 
+named_variants! { ShadingFrame { Surface "surface", Nori "nori", } }
+
 /// Sides of a surface; the front is where its triangles are counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -245,3 +249,5 @@ pub enum Sides {
     /// Front and back.
     Both,
 }
+
+named_variants! { Sides { Front "front", Both "both", } }

@@ -74,6 +74,10 @@ pub enum TexelFilter {
     Nearest,
 }
 
+named_variants! { Encoding { Linear "linear", Srgb "srgb", } }
+named_variants! { Wrap { Repeat "repeat", Mirror "mirror", Clamp "clamp", } }
+named_variants! { TexelFilter { Bilinear "bilinear", Nearest "nearest", } }
+
 /// A decoded texel: linear colour and alpha.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texel {

@@ -22,19 +22,10 @@ pub(super) fn set(material: &mut Material, field: MaterialField, value: &Value) 
         }
         MaterialField::Model => material.model = value::choice(value, Model::from_name)?,
         MaterialField::Masking => {
-            material.masking = value::choice(value, |name| match name {
-                "matched" => Some(Masking::Matched),
-                "remapped" => Some(Masking::Remapped),
-                _ => None,
-            })?;
+            material.masking = value::choice(value, Masking::from_name)?;
         }
         MaterialField::Diffuse => {
-            material.diffuse = value::choice(value, |name| match name {
-                "burley" => Some(DiffuseModel::Burley),
-                "lambert" => Some(DiffuseModel::Lambert),
-                "lambert_fresnel" => Some(DiffuseModel::LambertFresnel),
-                _ => None,
-            })?;
+            material.diffuse = value::choice(value, DiffuseModel::from_name)?;
         }
         MaterialField::TransmissionColor => {
             let color = value::or_none(value, |v| value::color(v, 1.0))?;
