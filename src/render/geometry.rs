@@ -63,7 +63,11 @@ impl Geometry {
             let mesh = &scene.meshes[instance.mesh.0 as usize];
             let to_world = instance.world_from_object;
             let place = |p: Vec3| {
-                if origin == Vec3::ZERO { to_world.transform_point3(p) } else { placed_from(origin, &to_world, p) }
+                if origin == Vec3::ZERO {
+                    to_world.transform_point3(p)
+                } else {
+                    placed_from(origin, &to_world, p)
+                }
             };
             for (k, corners) in mesh.triangles.iter().enumerate() {
                 vertices.push(corners.map(|c| place(mesh.positions[c as usize])));

@@ -96,7 +96,11 @@ pub(super) fn trace(
         if path.first.is_none() {
             path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
         }
-        inspect(ReplayVertex { point: (surface.point + scene.geometry.origin()).into(), radiance: path.radiance, beta });
+        inspect(ReplayVertex {
+            point: (surface.point + scene.geometry.origin()).into(),
+            radiance: path.radiance,
+            beta,
+        });
         let Some(shading) = shading else { break };
         if scatterings == scene.settings.max_depth {
             break;

@@ -167,7 +167,7 @@ impl Closed {
     pub(crate) fn shoot(&self, at: Placement, aim: Aim, rays: u64) -> Shots {
         let geometry = Geometry::build(&scene_of(self.placed(at))).expect("a tree");
         let mesh = self.placed(at);
-        let per_chunk = 1 << 16;
+        let per_chunk = 1 << 14;
         (0..rays.div_ceil(per_chunk))
             .into_par_iter()
             .map(|chunk| {
@@ -207,7 +207,8 @@ impl Closed {
             let has_side = departure.normal() != -ray.direction;
             let inward = if has_side { -departure.normal() } else { -ray.direction };
             // On an edge a ray may touch a face that turns away behind it, and slivers may be folded.
-            let [a, b, c] = mesh.triangles[hit.triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3());
+            let [a, b, c] =
+                mesh.triangles[hit.triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3());
             let longest = (b - a).length_squared().max((c - a).length_squared());
             let is_sliver = (b - a).cross(c - a).length() < 1e-5 * longest;
             let in_face = has_side && !is_sliver && hit.barycentric.iter().all(|&b| b > 1e-5);

@@ -256,10 +256,20 @@ fn what_only_an_unread_extension_holds_is_named() {
 fn attributes_that_are_no_numbers_are_mended_and_counted() {
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     let cases: [(&str, &str, &[f32], &str); 4] = [
-        ("NORMAL", "VEC3", &[0., 0., 1., nan, 0., 1., 0., inf, 0., 0., 0., 0.], "3 normals without a direction"),
+        (
+            "NORMAL",
+            "VEC3",
+            &[0., 0., 1., nan, 0., 1., 0., inf, 0., 0., 0., 0.],
+            "3 normals without a direction",
+        ),
         ("TEXCOORD_0", "VEC2", &[0., 1., nan, 1., 1., inf, 0., 0.], "2 texture coordinates"),
         ("COLOR_0", "VEC3", &[nan, 0., 0., inf, 1., 1., -inf, 0., 0., 1., 1., 1.], "3 vertex colours"),
-        ("TANGENT", "VEC4", &[nan, 0., 0., 1., 1., 0., 0., 1., 1., 0., 0., inf, 1., 0., 0., 1.], "2 tangents"),
+        (
+            "TANGENT",
+            "VEC4",
+            &[nan, 0., 0., 1., 1., 0., 0., 1., 1., 0., 0., inf, 1., 0., 0., 1.],
+            "2 tangents",
+        ),
     ];
     for (attribute, kind, values, told) in cases {
         let bytes = minimal(|json, bin| {

@@ -50,12 +50,7 @@ fn an_environment_with_nan_is_rendered_with_zeros_and_the_record_says_how_many()
             path: "environment.image".into(),
             value: Value::Text(sky.display().to_string()),
         }],
-        settings: RenderSettings {
-            width: Some(16),
-            height: Some(12),
-            spp: 4,
-            ..RenderSettings::default()
-        },
+        settings: RenderSettings { width: Some(16), height: Some(12), spp: 4, ..RenderSettings::default() },
         coordinates: Vec::new(),
     };
     let loaded = load(&job.scene, &Default::default(), &Default::default()).expect("a scene");
@@ -79,7 +74,6 @@ fn texture_coordinates_and_normals_of_an_obj_that_are_no_numbers_are_mended_and_
     assert!(mesh.uvs.iter().flatten().all(|uv| uv.is_finite()));
     assert!(mesh.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-6));
     let all: Vec<String> = imported.warnings.iter().map(ToString::to_string).collect();
-    eprintln!("{all:?}");
     assert!(all.iter().any(|w| w.contains("exture coordinates")), "{all:?}");
     assert!(all.iter().any(|w| w.contains("normal")), "{all:?}");
 }
