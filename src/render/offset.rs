@@ -21,7 +21,9 @@
 //!
 //! Near an edge, the bound along one face's normal does not keep the ray off the other face: where they meet at a right angle, it
 //! moves along it. There the origin is pushed from every plane nearby, to the side that the ray came from, whose origin was itself
-//! so placed. Then no path leaves a closed mesh, whatever the shape of its triangles.
+//! so placed. Then no path leaves a closed mesh whose triangles are higher than their own rounding; `benches/closed_mesh.rs` counts.
+//! Of rays aimed at the edges of thinner ones some in 100,000 do. Light that goes through has no free ray to follow on the other side
+//! and starts off its own triangle alone.
 
 use glam::{DVec3, Vec3};
 
