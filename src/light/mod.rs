@@ -6,6 +6,8 @@ mod distribution;
 mod environment;
 mod punctual;
 
+use std::collections::BTreeMap;
+
 use glam::{DVec3, Vec3};
 
 use crate::color::Rgb;
@@ -99,6 +101,7 @@ impl Lights {
         let mut emitters = Vec::new();
         let mut powers = Vec::new();
         let mut by_triangle = Vec::new();
+        let mut by_place = BTreeMap::new();
         for t in triangles {
             let area_vector = area_vector(t.vertices);
             let sides = if t.sides == Sides::Both { 2.0 } else { 1.0 };
@@ -106,7 +109,12 @@ impl Lights {
                 f64::from(t.mean_radiance.luminance()) * area_vector.length() * std::f64::consts::PI * sides;
             // Coloured beyond Rec. 709 or not, what emits at all must have a chance.
             if power > 0.0 {
-                by_triangle.push((t.triangle, emitters.len() as u32));
+                // Of coincident lights one is seen: sampled on their own, each would shine in full.
+                let emitter = *by_place.entry(place(t)).or_insert(emitters.len() as u32);
+                by_triangle.push((t.triangle, emitter));
+                if (emitter as usize) < emitters.len() {
+                    continue;
+                }
                 emitters.push(Emitter::Triangle {
                     triangle: t.triangle,
                     vertices: t.vertices,
@@ -225,6 +233,19 @@ fn area_to_solid_angle(area_vector: Vec3, wi: Vec3, distance: f32) -> Option<f32
     (pdf.is_finite() && pdf > 0.0).then_some(pdf)
 }
 
+/// What triangles have in common that emit from the same place to the same sides.
+fn place(t: &EmissiveTriangle) -> (bool, [[u32; 3]; 3]) {
+    let mut corners = t.vertices.map(|v| v.to_array().map(f32::to_bits));
+    if t.sides == Sides::Both {
+        corners.sort_unstable();
+    } else {
+        // The winding stays.
+        let first = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+        corners.rotate_left(first);
+    }
+    (t.sides == Sides::Both, corners)
+}
+
 /// The area of a triangle in m², along its normal. In f64, where the product of two tiny edges does not vanish, nor the difference
 /// of the products of two long ones of a needle.
 fn area_vector(v: [Vec3; 3]) -> DVec3 {
@@ -296,6 +317,21 @@ mod tests {
             })
             .count();
         assert_eq!(bright, 800);
+    }
+
+    #[test]
+    fn coincident_lights_are_one_light_unless_they_face_apart() {
+        let mut lights = quad_lights();
+        let mut again = lights[0];
+        again.triangle = 20;
+        again.vertices.rotate_left(1);
+        let mut turned = EmissiveTriangle { triangle: 21, ..again };
+        turned.vertices.swap(0, 1);
+        lights.extend([again, turned]);
+        let lights = Lights::new(&lights, &[], None, 3.0);
+        assert_eq!(lights.counts(), [3, 0, 0]);
+        let pdf = |triangle| lights.pdf_triangle(triangle, Vec3::Y, 2.0);
+        assert!(pdf(20) == pdf(10) && pdf(20) > 0.0);
     }
 
     #[test]

@@ -47,7 +47,7 @@ fn configs_fit_their_scenes() {
         let mut manifest: toml::Table = text.parse().unwrap();
         let render = manifest.entry("render").or_insert_with(|| toml::Table::new().into());
         let render = render.as_table_mut().unwrap();
-        for (key, value) in [("width", 12), ("height", 9), ("spp", 1)] {
+        for (key, value) in [("width", 32), ("height", 24), ("spp", 4)] {
             render.insert(key.into(), value.into());
         }
         manifest.remove("compare");

@@ -167,7 +167,7 @@ impl Closed {
     pub(crate) fn shoot(&self, at: Placement, aim: Aim, rays: u64) -> Shots {
         let geometry = Geometry::build(&scene_of(self.placed(at))).expect("a tree");
         let mesh = self.placed(at);
-        let per_chunk = 1 << 16;
+        let per_chunk = 1 << 14;
         (0..rays.div_ceil(per_chunk))
             .into_par_iter()
             .map(|chunk| {

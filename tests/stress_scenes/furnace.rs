@@ -56,9 +56,11 @@ fn every_path_in_every_closed_mesh_finds_all_its_light_at_every_scale() {
     }
 }
 
-/// A sphere's own density of area is the cosine's: both strategies agree, and what noise there is comes from the facets.
+/// In a sphere both strategies have the same density, that of the cosine, and no sample is better than another: what noise is left
+/// in a pixel of 256 samples comes from the facets.
 const FINE: u32 = 128;
-const BOUND: f64 = 0.002;
+/// The largest |pixel/exact - 1|: 0.0008 was measured.
+const BOUND: f64 = 0.0015;
 
 #[test]
 fn every_pixel_of_a_furnace_is_right_at_every_scale() {
@@ -66,10 +68,20 @@ fn every_pixel_of_a_furnace_is_right_at_every_scale() {
         let room = room(sphere(scale, Vec3::ZERO, FINE), Vec3::new(0.1, 0.2, 0.3) * scale, Vec3::X);
         let rendered = render_scene(&room, &small(12, 12, 256, DEPTH));
         let error = largest_error(&rendered, exact());
-        eprintln!("scale {scale:e} {error:e}");
         assert!(error < BOUND, "scale {scale}: {error:e}");
         assert_eq!(rendered.counts.bad_samples, 0);
     }
+}
+
+/// Every face twice, in the same place: one of them is seen, so one of them shines.
+#[test]
+fn coincident_faces_do_not_shine_twice() {
+    let mut mesh = sphere(1.0, Vec3::ZERO, 24);
+    mesh.triangles.extend_from_within(..);
+    let rendered = render_scene(&room(mesh, Vec3::new(0.1, 0.2, 0.3), Vec3::X), &small(12, 12, 256, DEPTH));
+    let error = largest_error(&rendered, exact());
+    assert!(error < 0.02, "{error:e}");
+    assert_eq!(rendered.counts.bad_samples, 0);
 }
 
 /// A mesh that is moved there by its instance keeps its shape whatever its size, since all is rendered around the scene's centre.
@@ -81,22 +93,20 @@ fn every_pixel_of_a_furnace_is_right_a_thousand_kilometres_from_the_origin() {
         room.instances[0].world_from_object = Affine3A::from_translation(center);
         let rendered = render_scene(&room, &small(12, 12, 256, DEPTH));
         let error = largest_error(&rendered, exact());
-        eprintln!("moved scale {scale:e} {error:e}");
         assert!(error < BOUND, "scale {scale}: {error:e}");
         assert_eq!(rendered.counts.bad_samples, 0);
     }
 }
 
-/// A mesh that is modelled there has corners on a grid of 1/16 m: facets are uneven, which light sampling pays for with noise, and
-/// below a radius of some grid steps there is no sphere any more.
+/// A mesh that is modelled there has corners on a grid of 1/16 m: facets are uneven, which light sampling pays for with noise. Below
+/// a radius of some grid steps there is no sphere any more.
 #[test]
 fn every_pixel_of_a_furnace_modelled_far_away_is_right_as_far_as_floats_can_hold_it() {
-    for (radius, bound) in [(1e1, 0.3), (1e2, 0.05), (1e3, 0.01), (1e6, 0.002)] {
+    for (radius, bound) in [(1e1, 0.02), (1e2, 0.004), (1e3, BOUND), (1e6, BOUND)] {
         let center = Vec3::new(1e6, -1e6, 1e6);
         let room = room(sphere(radius, center, FINE), center, Vec3::X);
         let rendered = render_scene(&room, &small(12, 12, 256, DEPTH));
         let error = largest_error(&rendered, exact());
-        eprintln!("baked radius {radius:e} {error:e}");
         assert!(error < bound, "radius {radius}: {error:e}");
         assert_eq!(rendered.counts.bad_samples, 0);
     }

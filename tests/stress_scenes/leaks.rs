@@ -13,7 +13,7 @@ fn no_ray_leaves_a_closed_mesh() {
             if !closed.is_sound && offset > 0.0 {
                 continue;
             }
-            let shots = closed.shoot(Placement { scale, offset }, Aim::Anywhere, 20_000);
+            let shots = closed.shoot(Placement { scale, offset }, Aim::Anywhere, 16_000);
             assert_eq!(
                 (shots.escaped, shots.outside),
                 (0, 0),
@@ -28,7 +28,7 @@ fn no_ray_leaves_a_closed_mesh() {
 fn no_ray_slips_through_an_edge_or_a_vertex_or_starts_behind_one() {
     for closed in meshes().iter().filter(|m| m.is_sound) {
         for (scale, offset) in PLACEMENTS {
-            let shots = closed.shoot(Placement { scale, offset }, Aim::Edges, 20_000);
+            let shots = closed.shoot(Placement { scale, offset }, Aim::Edges, 16_000);
             assert_eq!(
                 (shots.escaped, shots.outside),
                 (0, 0),

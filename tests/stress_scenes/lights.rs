@@ -135,7 +135,6 @@ fn a_sun_of_one_pixel_is_neither_lost_nor_doubled() {
             let sigma = variance.iter().map(|&v| f64::from(v)).sum::<f64>().sqrt() / n;
             let exact = 0.5 / std::f64::consts::PI * irradiance;
             let error = mean(&rendered) - exact;
-            eprintln!("sun {} {exact} {sigma}", mean(&rendered));
             assert!(error.abs() < 4.0 * sigma, "{} {exact} ± {sigma}", mean(&rendered));
             assert!(sigma < 0.01 * exact, "{sigma}");
         }

@@ -74,7 +74,6 @@ fn texture_coordinates_and_normals_of_an_obj_that_are_no_numbers_are_mended_and_
     assert!(mesh.uvs.iter().flatten().all(|uv| uv.is_finite()));
     assert!(mesh.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-6));
     let all: Vec<String> = imported.warnings.iter().map(ToString::to_string).collect();
-    eprintln!("{all:?}");
     assert!(all.iter().any(|w| w.contains("exture coordinates")), "{all:?}");
     assert!(all.iter().any(|w| w.contains("normal")), "{all:?}");
 }
