@@ -199,7 +199,8 @@ impl PreparedMaterial {
     }
 }
 
-fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f32) -> Bsdf {
+/// The BSDF of a material where its parameters have these values.
+pub(crate) fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f32) -> Bsdf {
     match material.model {
         Model::Disney => {
             let mut params = Params { base_color, ..Params::default() };

@@ -13,17 +13,17 @@ const MAX_BYTES: usize = 1 << 20;
 
 /// A value with its place.
 #[derive(Clone, Debug)]
-pub(super) struct Node {
-    pub place: Place,
-    pub value: Value,
+pub(crate) struct Node {
+    pub(crate) place: Place,
+    pub(crate) value: Value,
 }
 
 /// Where something stands.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
-    pub file: Arc<str>,
-    pub line: u64,
-    pub column: u64,
+pub(crate) struct Place {
+    pub(crate) file: Arc<str>,
+    pub(crate) line: u64,
+    pub(crate) column: u64,
 }
 
 impl fmt::Display for Place {
@@ -34,7 +34,7 @@ impl fmt::Display for Place {
 
 /// What a node holds.
 #[derive(Clone, Debug)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Null,
     Bool,
     Number(f64),
@@ -45,7 +45,7 @@ pub(super) enum Value {
 }
 
 /// Reads one document.
-pub(super) fn parse(file: &str, bytes: &[u8]) -> Result<Node, ArisError> {
+pub(crate) fn parse(file: &str, bytes: &[u8]) -> Result<Node, ArisError> {
     if bytes.len() > MAX_BYTES {
         return Err(ArisError::TooLarge { file: file.to_owned(), size: bytes.len(), max: MAX_BYTES });
     }
