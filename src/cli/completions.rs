@@ -18,6 +18,6 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Outcome {
     let mut text = Vec::new();
     clap_complete::generate(arguments.shell, &mut super::Arguments::command(), "pipeline", &mut text);
-    print(&text)?;
+    print(&String::from_utf8_lossy(&text))?;
     Ok(WELL)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::progress::Progress;
 use super::render::parse_enum;
-use super::{FAILED, Outcome, Talk, WELL, print, tell};
+use super::{FAILED, Outcome, Talk, WELL, print, print_bytes, tell};
 use crate::disney::{DiffuseModel, Masking};
 use crate::inspect::eval::{Variant, evaluate};
 use crate::inspect::{Edit, InspectError, MOST, Options, Target, gather, look, numbers, write_report};
@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// Set a parameter of every material; several values, as in roughness=0.1,0.3,0.6, make variants to compare.
     #[arg(short = 'p', long = "param", value_name = "NAME=VALUE")]
     params: Vec<String>,
-    /// The folder for index.html and the PNGs.
+    /// The folder for index.html and the PNGs, or the page if it ends in .html: the PNGs lie beside it.
     #[arg(short, long, value_name = "FOLDER", default_value = "outputs/inspect")]
     output: PathBuf,
     /// Read rows of parameters and directions, with the columns base_color_r … clearcoat_gloss, lx, ly, lz (to the light) and vx, vy,
@@ -88,7 +88,7 @@ fn inspect(arguments: &Arguments, talk: Talk) -> Result<u8, InspectError> {
     } else {
         files.iter().map(|file| format!("{}\n", file.display())).collect()
     };
-    print(text).map_err(|cause| InspectError::File { path: "stdout".into(), cause })?;
+    print(&text).map_err(|cause| InspectError::File { path: "stdout".into(), cause })?;
     Ok(WELL)
 }
 
@@ -103,7 +103,7 @@ fn evaluate_rows(arguments: &Arguments, file: &Path, talk: Talk) -> Outcome {
         Variant { masking: arguments.g.unwrap_or_default(), diffuse: arguments.diffuse.unwrap_or_default() };
     let mut out = Vec::new();
     let summary = evaluate(&bytes, &name, variant, &mut out)?;
-    print(&out)?;
+    print_bytes(&out)?;
     for failure in &summary.failures {
         tell(&format!("{name}:{}: {}", failure.line, failure.why));
     }

@@ -120,9 +120,14 @@ fn tell(text: &str) {
 }
 
 /// Text to stdout. A reader that has gone away, as `head` does, ends the output and is no error.
-fn print(text: impl AsRef<[u8]>) -> Result<(), std::io::Error> {
+fn print(text: &str) -> Result<(), std::io::Error> {
+    print_bytes(text.as_bytes())
+}
+
+/// The same for what need not be UTF-8.
+fn print_bytes(bytes: &[u8]) -> Result<(), std::io::Error> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_ref()).and_then(|()| out.flush()) {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
     }

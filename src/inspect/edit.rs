@@ -142,7 +142,7 @@ mod tests {
     fn lists_are_variants_and_colours_are_one_value() {
         assert_eq!(values("roughness=0.1, 0.3"), [Value::Number(0.1), Value::Number(0.3)]);
         let red = Value::List([0.9, 0.1, 0.1].map(Value::Number).to_vec());
-        assert_eq!(values("color=0.9,0.1,0.1"), [red.clone()]);
+        assert_eq!(values("color=0.9,0.1,0.1"), std::slice::from_ref(&red));
         assert_eq!(values("baseColor=[0.9, 0.1, 0.1], #aabbcc"), [red, Value::Text("#aabbcc".into())]);
         assert_eq!(values("model=mirror,disney").len(), 2);
         for wrong in ["roughness", "roughness=", "roughness=0.1,,0.2", "roughness=1999-01-01"] {

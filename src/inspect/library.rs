@@ -69,7 +69,8 @@ fn value(node: &Node) -> Option<Value> {
         yaml::Value::Number(n) => Value::Number(*n),
         yaml::Value::Text(text) => Value::Text(text.clone()),
         yaml::Value::List(items) => Value::List(items.iter().map(value).collect::<Option<_>>()?),
-        yaml::Value::Null | yaml::Value::Bool | yaml::Value::Map(_) => return None,
+        yaml::Value::Bool(b) => Value::Bool(*b),
+        yaml::Value::Null | yaml::Value::Map(_) => return None,
     })
 }
 

@@ -166,9 +166,16 @@ fn parameters(sections: &[Section<'_>]) -> Vec<ParameterView> {
     };
     let line = |name: &'static str| {
         let cells: Vec<CellView> = (0..tables.len()).map(|i| cell(name, i)).collect();
-        ParameterView { name, differs: cells.iter().any(|c| c.value != cells[0].value), cells }
+        ParameterView { name, differs: differ(&cells), cells }
     };
     names.into_iter().map(line).collect()
+}
+
+/// Whether the materials that have a parameter have it differently.
+fn differ(cells: &[CellView]) -> bool {
+    let mut values = cells.iter().map(|c| &c.value).filter(|v| !v.is_empty());
+    let first = values.next();
+    values.any(|v| Some(v) != first)
 }
 
 /// A linear colour as CSS has it.

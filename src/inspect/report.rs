@@ -53,14 +53,17 @@ pub fn look(subject: Subject, options: Options, control: &Control) -> Result<Ins
     Ok(Inspected { subject, measurements, sphere, maps })
 }
 
-/// Writes `index.html`, and `sphere_NAME.png`, `polar_NAME.png`, `albedo_NAME.png` and `density_NAME.png` for each material;
-/// `comparison.png` as well if there are several. Returns the files, the page first.
+/// Writes the page, and beside it `sphere_NAME.png`, `polar_NAME.png`, `albedo_NAME.png` and `density_NAME.png` for each material;
+/// `comparison.png` as well if there are several. A `path` that ends in `.html` is the page, any other is the folder of
+/// `index.html`. Returns the files, the page first.
 ///
 /// # Errors
 /// If a chart can't be drawn or a file can't be written.
-pub fn write_report(folder: &Path, inspected: &[Inspected]) -> Result<Vec<PathBuf>, InspectError> {
+pub fn write_report(path: &Path, inspected: &[Inspected]) -> Result<Vec<PathBuf>, InspectError> {
+    let is_page = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
+    let page_path = if is_page { path.to_owned() } else { path.join("index.html") };
+    let folder = page_path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder).map_err(|cause| InspectError::File { path: folder.to_owned(), cause })?;
-    let page_path = folder.join("index.html");
     let mut files = vec![page_path.clone()];
     let mut pages = Vec::new();
     let mut taken = HashSet::new();
@@ -98,8 +101,7 @@ pub fn write_report(folder: &Path, inspected: &[Inspected]) -> Result<Vec<PathBu
         let spheres: Vec<(&str, &Picture)> =
             inspected.iter().map(|one| (one.subject.name.as_str(), &one.sphere)).collect();
         let charts = [chart::picture(&polar)?, chart::picture(&albedo)?];
-        let width = charts[0].width.max(880);
-        let picture = chart::stacked(&[&[chart::row(&spheres, width)?], &charts[..]].concat());
+        let picture = chart::stacked(&[&[chart::row(&spheres)?], &charts[..]].concat());
         write("comparison.png".to_owned(), &picture)?;
         Some((chart::svg(&polar, "polar slices of all")?, chart::svg(&albedo, "albedo of all")?))
     } else {

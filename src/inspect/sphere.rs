@@ -24,7 +24,7 @@ const FLOOR: f32 = 60.0;
 /// The reflectances of the floor's squares, each a metre wide.
 const SQUARES: [u8; 2] = [150, 95];
 /// The exposure of the pictures, in stops.
-const EXPOSURE: f32 = -0.2;
+const EXPOSURE: f32 = 0.2;
 
 /// An 8-bit sRGB picture, three bytes a pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -114,8 +114,8 @@ impl Subject {
                 row(parameter.name(), number(value.into()), value == parameter.default());
             }
             let masking = match material.masking {
-                Masking::Matched => "matched: G has the roughness of D",
-                Masking::Remapped => "remapped: G has 0.5 + roughness/2",
+                Masking::Matched => "matched",
+                Masking::Remapped => "remapped",
             };
             row("masking", masking.to_owned(), material.masking == defaults.masking);
             let diffuse = match material.diffuse {

@@ -46,13 +46,10 @@ impl Figure for Albedo {
             .set_label_area_size(LabelAreaPosition::Left, 52 * FINE)
             .set_label_area_size(LabelAreaPosition::Bottom, 44 * FINE)
             .build_cartesian_2d(0.0..90.0, 0.0..top)?;
-        for (i, (color, _)) in self.areas.iter().enumerate() {
-            chart.draw_series(std::iter::once(Polygon::new(self.band(i), color.mix(0.75))))?;
-        }
         let label = text_style(12.0, &FAINT, HPos::Center, VPos::Center);
         chart
             .configure_mesh()
-            .light_line_style(TRANSPARENT)
+            .max_light_lines(0)
             .bold_line_style(stroke(GRID, 1.0))
             .axis_style(stroke(FAINT, 1.0))
             .set_all_tick_mark_size(4 * FINE)
@@ -66,6 +63,9 @@ impl Figure for Albedo {
             .x_label_style(text_style(12.0, &FAINT, HPos::Center, VPos::Top))
             .y_label_style(label)
             .draw()?;
+        for (i, (color, _)) in self.areas.iter().enumerate() {
+            chart.draw_series(std::iter::once(Polygon::new(self.band(i), color.mix(0.75))))?;
+        }
         if top > 1.1 {
             let one = PathElement::new(vec![(0.0, 1.0), (90.0, 1.0)], stroke(FAINT, 1.5));
             chart.draw_series(std::iter::once(one))?;

@@ -10,8 +10,10 @@ use crate::inspect::measure::{Curve, View};
 const WIDTH: u32 = 880;
 /// Of each of the two rows.
 const HEIGHT: u32 = 260;
-/// Decades below the largest value that are shown.
-const DECADES: i32 = 6;
+/// The fewest and the most decades below the largest value that are shown.
+const DECADES: [f64; 2] = [3.0, 6.0];
+/// Angles nearer the horizon than this many degrees don't decide how many: there both fall to 0.
+const EDGE: f64 = 6.0;
 
 /// Panels of log scale, one a view.
 pub(in super::super) struct Density<'a> {
@@ -61,7 +63,10 @@ where
     }
     area.draw(&Text::new(heading, (left, top), title))?;
     let high = libm::ceil(libm::log10(largest));
-    let low = high - f64::from(DECADES);
+    let inside = wanted.iter().filter(|(a, v)| (a.abs() - 90.0).abs() > EDGE && *v > 0.0);
+    let least = inside.map(|p| p.1).fold(largest, f64::min);
+    let decades = (high - libm::floor(libm::log10(least))).clamp(DECADES[0], DECADES[1]);
+    let low = high - decades;
     let end = view.total.last().map_or(90.0, |p| p.0);
     let mut chart = ChartBuilder::on(area)
         .margin(4 * FINE)
@@ -72,12 +77,12 @@ where
         .build_cartesian_2d(-end..end, low..high)?;
     chart
         .configure_mesh()
-        .light_line_style(TRANSPARENT)
+        .max_light_lines(0)
         .bold_line_style(stroke(GRID, 1.0))
         .axis_style(stroke(FAINT, 1.0))
         .set_all_tick_mark_size(3 * FINE)
-        .x_labels(8)
-        .y_labels(DECADES as usize + 1)
+        .x_labels(13)
+        .y_labels(decades as usize + 1)
         .x_label_formatter(&|x| format!("{x:.0}°"))
         .y_label_formatter(&|y| power(*y))
         .x_label_style(text_style(11.0, &FAINT, HPos::Center, VPos::Top))

@@ -117,17 +117,16 @@ pub(super) fn stacked(pictures: &[Picture]) -> Picture {
     Picture { width, height: pictures.iter().map(|p| p.height).sum(), rgb }
 }
 
-/// Pictures of one height beside each other with white space between, each under its name.
-pub(super) fn row(pictures: &[(&str, &Picture)], width: u32) -> Result<Picture, ChartError> {
+/// Pictures of one height in a row with white space between, or in two rows if there are many, each under its name.
+pub(super) fn row(pictures: &[(&str, &Picture)]) -> Result<Picture, ChartError> {
     const SPACE: u32 = 12;
     const HEADING: u32 = 26;
     let count = pictures.len().max(1) as u32;
+    let columns = if count <= 4 { count } else { count.div_ceil(2) };
     let cell = pictures.iter().map(|(_, p)| p.width).max().unwrap_or(0) + SPACE;
-    let columns = (width / cell).clamp(1, count);
-    let lines = count.div_ceil(columns);
     let line = pictures.iter().map(|(_, p)| p.height).max().unwrap_or(0) + HEADING + SPACE;
     let fonts = Fonts::load()?;
-    let mut sheet = Paper::new(width.max(cell + SPACE), lines * line + SPACE, &fonts);
+    let mut sheet = Paper::new(columns * cell + SPACE, count.div_ceil(columns) * line + SPACE, &fonts);
     for (i, (name, picture)) in (0u32..).zip(pictures) {
         let (x, y) = (SPACE + i % columns * cell, SPACE + i / columns * line);
         sheet.caption(name, x, y, picture.width);

@@ -130,6 +130,10 @@ impl DrawingBackend for &mut Paper<'_> {
     }
 
     fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
+        // Polygons are filled with such lines, and may be translucent.
+        if style.stroke_width() == 1 {
+            return plotters_backend::rasterizer::draw_line(self, from, to, style);
+        }
         self.segment(from, to, style.color(), style.stroke_width());
         Ok(())
     }

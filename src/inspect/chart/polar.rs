@@ -16,7 +16,7 @@ const ABOVE: i32 = 46;
 /// Room below it.
 const BELOW: i32 = 34;
 /// Below this value (in 1/sr) the radius grows linearly, above it with the logarithm.
-const LINEAR: f64 = 0.03;
+const LINEAR: f64 = 0.01;
 
 /// Slices from several angles with one scale.
 pub(in super::super) struct Polar<'a> {
@@ -121,7 +121,7 @@ impl Polar<'_> {
         }
 
         // Where the viewer is.
-        let viewer = at(-panel.angle, f64::from((RADIUS - 4) * FINE));
+        let viewer = at(-panel.angle, f64::from((RADIUS - 12) * FINE));
         dashes(area, (x.into(), y.into()), viewer, stroke(INK, 1.2))?;
         area.draw(&Circle::new(whole(viewer), 4 * FINE, INK.filled()))?;
         let title = format!("viewer at {}°", panel.angle);
@@ -141,8 +141,12 @@ impl Polar<'_> {
                 area.draw(&PathElement::new(points, stroke(*color, 2.0)))?;
             }
         }
-        for &(color, angle, weight) in &panel.spikes {
-            let tip = whole(at(angle, f64::from((RADIUS - 24) * FINE)));
+        // The longest first, so that shorter ones at the same angle stay visible.
+        let mut spikes = panel.spikes.clone();
+        spikes.sort_by(|a, b| b.2.total_cmp(&a.2));
+        for (color, angle, weight) in spikes {
+            let length = f64::from((RADIUS - 16) * FINE) * weight.clamp(0.0, 1.0).sqrt();
+            let tip = whole(at(angle, length));
             area.draw(&PathElement::new(vec![(x, y), tip], stroke(color, 3.5)))?;
             area.draw(&Circle::new(tip, 5 * FINE, color.filled()))?;
             let label = text_style(12.0, &INK, HPos::Left, VPos::Center);
