@@ -149,8 +149,3 @@ fn tint<F: Real>(color: Rgb<F>) -> Rgb<F> {
     let luminance = F::of(0.3) * color.r + F::of(0.6) * color.g + F::of(0.1) * color.b;
     if luminance > F::ZERO { color / luminance } else { Rgb::WHITE }
 }
-
-/// The reflectance of the specular lobe at normal incidence.
-pub fn reflectance_at_normal<F: Real>(params: &Params<F>) -> Rgb<F> {
-    specular_f0(params, tint(params.base_color))
-}

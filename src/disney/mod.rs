@@ -22,7 +22,6 @@ mod tests;
 pub use bsdf::{Bsdf, BsdfSample, Lobe};
 pub use fresnel::{fresnel_dielectric, schlick_weight};
 pub use microfacet::{ALPHA_MIN, Alpha, alpha_from_roughness};
-pub use mixture::reflectance_at_normal;
 pub use parameter::{
     BASE_COLOR, DiffuseModel, Masking, Model, OutOfRange, Parameter, Params, check_base_color,
 };

@@ -112,6 +112,10 @@ fn value(text: &str) -> Option<Value> {
     if text.is_empty() {
         return None;
     }
+    // Also `.5` and `1.`, which TOML has not.
+    if let Ok(number) = text.parse() {
+        return Some(Value::Number(number));
+    }
     match format!("v = {text}").parse::<toml::Table>() {
         Ok(mut table) => from_toml(table.remove("v")?),
         Err(_) => Some(Value::Text(text.to_owned())),

@@ -95,7 +95,7 @@ pub fn gather(
                 for (edit, value) in variant {
                     set(&mut edited.item, edit.field, value).map_err(InspectError::Edit)?;
                 }
-                subjects.push(Subject::new(scene, &edited));
+                subjects.push(Subject::new(scene, &edited)?);
             }
         }
     }

@@ -85,6 +85,12 @@ pub enum InspectError {
         /// The file.
         file: PathBuf,
     },
+    /// A material that is not the same everywhere.
+    #[error("material `{material}` varies over the surface in a way that has no mean")]
+    Varies {
+        /// The material.
+        material: String,
+    },
     /// The sphere can't be rendered.
     #[error(transparent)]
     Render(#[from] crate::render::RenderError),

@@ -45,10 +45,9 @@ pub struct Inspected {
 /// # Errors
 /// If it can't be rendered.
 pub fn look(subject: Subject, options: Options, control: &Control) -> Result<Inspected, InspectError> {
-    let bsdf = subject.bsdf();
-    let measurements = measure(&bsdf);
+    let measurements = measure(&subject.bsdf);
     // Maps of two views show what there is to see: one near the normal, one near grazing.
-    let maps = maps(&bsdf, &measurements.views[1..3]);
+    let maps = maps(&subject.bsdf, &measurements.views[1..3]);
     let sphere = lit_sphere(&subject.material, options.size, options.spp, control)?;
     Ok(Inspected { subject, measurements, sphere, maps })
 }

@@ -1,11 +1,12 @@
 //! Materials to look into: the same at every point, with what was done to make them so.
 
+use super::InspectError;
 use crate::color::Rgb;
 use crate::disney::{
-    BASE_COLOR, Bsdf, DiffuseModel, Masking, Model, Parameter, Params, alpha_from_roughness,
-    reflectance_at_normal,
+    Alpha, BASE_COLOR, Bsdf, DiffuseModel, Lobe, Masking, Model, Parameter, alpha_from_roughness,
 };
-use crate::render::scatter;
+use crate::math::V3;
+use crate::render::constant_bsdf;
 use crate::scene::material::{Material, Param, TextureChannel, TextureMap};
 use crate::scene::{Named, Scene, texture::Texel};
 
@@ -16,6 +17,8 @@ pub struct Subject {
     pub name: String,
     /// All parameters constant, without maps.
     pub material: Material,
+    /// How it scatters light.
+    pub bsdf: Bsdf,
     /// The parameters that are means of textures, by name.
     pub means: Vec<&'static str>,
     /// What else of the material is not looked at.
@@ -37,7 +40,10 @@ pub struct ParameterRow {
 
 impl Subject {
     /// The material at every point as it is on average over its textures.
-    pub fn new(scene: &Scene<Material>, named: &Named<Material>) -> Self {
+    ///
+    /// # Errors
+    /// If something of it still varies.
+    pub fn new(scene: &Scene<Material>, named: &Named<Material>) -> Result<Self, InspectError> {
         let material = &named.item;
         let (mut means, mut notes) = (Vec::new(), Vec::new());
         let base_color = constant_color(scene, &material.base_color, BASE_COLOR, &mut means);
@@ -67,21 +73,26 @@ impl Subject {
                 notes.push(note);
             }
         }
-        Self { name: named.name.clone(), material: flat, means, notes }
-    }
-
-    /// How it scatters light.
-    pub fn bsdf(&self) -> Bsdf {
-        scatter(&self.material, self.base_color(), |p| self.scalar(p))
-    }
-
-    /// All its parameters.
-    fn params(&self) -> Params {
-        let mut params = Params { base_color: self.base_color(), ..Params::default() };
-        for parameter in Parameter::ALL {
-            *params.get_mut(parameter) = self.scalar(parameter);
+        let name = named.name.clone();
+        match constant_bsdf(&flat) {
+            Some(bsdf) => Ok(Self { name, material: flat, bsdf, means, notes }),
+            None => Err(InspectError::Varies { material: name }),
         }
-        params
+    }
+
+    /// The roughness of the specular lobe's distribution along the tangent and across it.
+    fn alpha(&self) -> Alpha<f32> {
+        alpha_from_roughness(self.scalar(Parameter::Roughness), self.scalar(Parameter::Anisotropic))
+    }
+
+    /// The specular lobe's reflectance at normal incidence, if it has a distribution: straight from above its value is
+    /// F0·D/4 with D = 1/(π ax ay).
+    fn reflectance_at_normal(&self) -> Option<Rgb> {
+        let normal = V3::new(0.0, 0.0, 1.0);
+        let has_distribution = self.bsdf.lobes().contains(&Lobe::Specular);
+        let alpha = self.alpha();
+        let d = std::f32::consts::FRAC_1_PI / (alpha.x * alpha.y);
+        has_distribution.then(|| self.bsdf.eval_lobe(Lobe::Specular, normal, normal) * (4.0 / d))
     }
 
     /// Its base colour.
@@ -124,9 +135,10 @@ impl Subject {
                 DiffuseModel::LambertFresnel => "lambert_fresnel",
             };
             row("diffuse", diffuse.to_owned(), material.diffuse == defaults.diffuse);
-            let params = self.params();
-            row("F0", color_text(reflectance_at_normal(&params)), false);
-            let alpha = alpha_from_roughness(params.roughness, params.anisotropic);
+            if let Some(f0) = self.reflectance_at_normal() {
+                row("F0", color_text(f0), false);
+            }
+            let alpha = self.alpha();
             row("α along the tangent", number(alpha.x.into()), false);
             row("α across it", number(alpha.y.into()), false);
         }
@@ -211,4 +223,53 @@ fn mean(scene: &Scene<Material>, map: &TextureMap) -> Texel {
     }
     let texels = (f64::from(image.width) * f64::from(image.height)).max(1.0);
     Texel { color: (color / texels).cast(), alpha: (alpha / texels) as f32 }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
+    use crate::scene::{Image, ImageId, Texture, TextureId};
+
+    fn value<'a>(rows: &'a [ParameterRow], name: &str) -> &'a ParameterRow {
+        rows.iter().find(|row| row.name == name).unwrap_or_else(|| panic!("no {name}"))
+    }
+
+    #[test]
+    fn textures_count_as_their_mean_and_the_table_says_so() {
+        let mut scene = Scene::empty();
+        let pixels = Pixels::U8(vec![0, 255, 255, 255]);
+        scene.images.push(Arc::new(Image { name: "x".into(), width: 4, height: 1, channels: 1, pixels }));
+        scene.textures.push(Texture {
+            image: ImageId(0),
+            encoding: Encoding::Linear,
+            wrap: [Wrap::Repeat; 2],
+            filter: TexelFilter::Bilinear,
+        });
+        let map = TextureMap::new(TextureId(0), TextureChannel::R);
+        let mut material = Material { vertex_color: true, ..Material::default() };
+        *material.scalar_mut(Parameter::Roughness) = Param::Texture { map, factor: 0.8 };
+        let subject = Subject::new(&scene, &Named::new("wood", material)).unwrap();
+        assert!((subject.scalar(Parameter::Roughness) - 0.6).abs() < 1e-6);
+        let rows = subject.parameters();
+        assert_eq!(value(&rows, "roughness").value, "0.6");
+        assert_eq!(value(&rows, "roughness").note, "the mean of its texture");
+        assert!(value(&rows, "metallic").is_default && !value(&rows, "roughness").is_default);
+        assert_eq!(subject.notes, ["the mesh's vertex colours are left out"]);
+    }
+
+    #[test]
+    fn f0_and_alpha_follow_from_the_parameters() {
+        let mut material = Material::default();
+        for (parameter, value) in [(Parameter::Roughness, 0.6), (Parameter::Anisotropic, 0.5)] {
+            *material.scalar_mut(parameter) = Param::Constant(value);
+        }
+        let rows = Subject::new(&Scene::empty(), &Named::new("x", material)).unwrap().parameters();
+        // 0.08·specular; 0.36 over and times sqrt(1 - 0.9·0.5).
+        assert_eq!(value(&rows, "F0").value, "0.04, 0.04, 0.04");
+        assert_eq!(value(&rows, "α along the tangent").value, "0.4854");
+        assert_eq!(value(&rows, "α across it").value, "0.267");
+    }
 }

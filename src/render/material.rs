@@ -55,6 +55,14 @@ enum Tangent {
     },
 }
 
+/// The BSDF of a material that is the same everywhere, `None` for one that varies.
+pub fn constant_bsdf(material: &Material) -> Option<Bsdf> {
+    match PreparedMaterial::new(material).bsdf {
+        Scattering::Constant(bsdf) => Some(bsdf),
+        Scattering::Varying(_) => None,
+    }
+}
+
 impl PreparedMaterial {
     pub(super) fn new(material: &Material) -> Self {
         let varies = material.vertex_color
@@ -199,8 +207,7 @@ impl PreparedMaterial {
     }
 }
 
-/// The BSDF of a material where its parameters have these values.
-pub(crate) fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f32) -> Bsdf {
+fn scatter(material: &Material, base_color: Rgb, scalar: impl Fn(Parameter) -> f32) -> Bsdf {
     match material.model {
         Model::Disney => {
             let mut params = Params { base_color, ..Params::default() };

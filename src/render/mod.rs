@@ -15,7 +15,7 @@ use crate::accel::BuildError;
 
 pub use film::{Control, Rendered, render};
 pub use geometry::Geometry;
-pub(crate) use material::scatter;
+pub use material::constant_bsdf;
 pub use path::{Replay, ReplayVertex, replay};
 pub use prepare::{Prepared, image_size};
 
