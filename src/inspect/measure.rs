@@ -6,6 +6,8 @@
 
 use rayon::prelude::*;
 
+use super::energy::Energy;
+use super::maps::Map;
 use super::quadrature::{Integrals, integrate};
 use crate::color::Rgb;
 use crate::disney::{Bsdf, Lobe};
@@ -49,6 +51,8 @@ pub struct View {
     pub lobes: Vec<(Lobe, Curve)>,
     /// Their sum.
     pub total: Curve,
+    /// The same counted by energy: what the density should follow.
+    pub wanted: Curve,
     /// The density of sampling, in 1/sr.
     pub density: Curve,
     /// Delta lobes.
@@ -57,6 +61,8 @@ pub struct View {
     pub estimate: Estimate,
     /// What quadrature finds without it, apart from delta lobes.
     pub integrals: Integrals,
+    /// `wanted` and `density` over all directions, for some views.
+    pub(super) map: Option<Map>,
 }
 
 /// A delta lobe.
@@ -79,8 +85,7 @@ pub struct Estimate {
     pub albedo: Rgb<f64>,
     /// The standard error of its luminance.
     pub error: f64,
-    /// The luminance that arrives from a white sky of radiance 1 by lobes that are no delta: what quadrature finds. For materials
-    /// that transmit it is less than the albedo, which counts energy: radiance is squeezed on the way in.
+    /// The albedo's luminance without delta lobes: what quadrature finds.
     pub smooth: f64,
     /// Each lobe's part of the luminance.
     pub lobes: Vec<(Lobe, f64)>,
@@ -106,7 +111,10 @@ pub fn measure(bsdf: &Bsdf) -> Measurements {
     Measurements {
         lobes: bsdf.lobes(),
         views: VIEWS.par_iter().map(|&angle| view(bsdf, angle)).collect(),
-        albedo: ALBEDO_ANGLES.par_iter().map(|&angle| estimate(bsdf, angle).0).collect(),
+        albedo: ALBEDO_ANGLES
+            .par_iter()
+            .map(|&angle| estimate(bsdf, &Energy::new(bsdf, direction(-angle)), angle).0)
+            .collect(),
     }
 }
 
@@ -118,21 +126,28 @@ pub(super) fn direction(angle: f64) -> V3<f32> {
 
 fn view(bsdf: &Bsdf, angle: f64) -> View {
     let wo = direction(-angle);
-    let (estimate, below) = estimate(bsdf, angle);
+    let energy = Energy::new(bsdf, wo);
+    let (estimate, below) = estimate(bsdf, &energy, angle);
     let angles = slice_angles(angle, below.is_some());
     let curve = |value: &dyn Fn(V3<f32>) -> f64| -> Curve {
         angles.iter().map(|&a| (a, value(direction(a)))).collect()
     };
     let seen = |f: Rgb, wi: V3<f32>| f64::from(f.luminance() * wi.z.abs());
     let lobes = bsdf.lobes().into_iter().filter(|lobe| !lobe.is_delta());
+    let lobes = lobes.map(|lobe| (lobe, curve(&|wi| seen(bsdf.eval_lobe(lobe, wo, wi), wi)))).collect();
+    let integrals = integrate(&energy, below);
+    // Maps of two views show what there is to see: one near the normal, one near grazing.
+    let is_mapped = angle == VIEWS[1] || angle == VIEWS[2];
     View {
         angle,
-        lobes: lobes.map(|lobe| (lobe, curve(&|wi| seen(bsdf.eval_lobe(lobe, wo, wi), wi)))).collect(),
+        lobes,
         total: curve(&|wi| seen(bsdf.eval(wo, wi), wi)),
-        density: curve(&|wi| f64::from(bsdf.pdf(wo, wi))),
+        wanted: curve(&|wi| energy.value_and_density(wi).0.luminance()),
+        density: curve(&|wi| energy.value_and_density(wi).1),
         spikes: spikes(bsdf, wo),
+        map: (is_mapped && estimate.smooth > 0.0).then(|| Map::new(&energy, angle, below.is_some())),
         estimate,
-        integrals: integrate(bsdf, wo, below),
+        integrals,
     }
 }
 
@@ -170,8 +185,7 @@ fn spikes(bsdf: &Bsdf, wo: V3<f32>) -> Vec<Spike> {
 }
 
 /// Estimates the albedo; also the mean direction of the samples below the surface, if there are any that are no delta.
-fn estimate(bsdf: &Bsdf, angle: f64) -> (Estimate, Option<V3<f64>>) {
-    let wo = direction(-angle);
+fn estimate(bsdf: &Bsdf, energy: &Energy<'_>, angle: f64) -> (Estimate, Option<V3<f64>>) {
     let lobes = bsdf.lobes();
     let count = f64::from(REPLICATES * SAMPLES);
     let mut means = [0.0; REPLICATES as usize];
@@ -183,16 +197,14 @@ fn estimate(bsdf: &Bsdf, angle: f64) -> (Estimate, Option<V3<f64>>) {
     for i in 0..REPLICATES * SAMPLES {
         let [u_lobe, u, v, _] =
             Sampler::new(0, (angle * 16.0) as u32, 0, i, REPLICATES).set(0, Purpose::Bsdf);
-        let Some(sample) = bsdf.sample(wo, u_lobe, [u, v]) else {
+        let Some(sample) = bsdf.sample(energy.wo, u_lobe, [u, v]) else {
             lost += 1.0 / count;
             continue;
         };
-        // Radiance that crosses an interface is squeezed by 1/eta²; the albedo counts energy.
-        let scale = f64::from(sample.wi.z.abs() * sample.eta * sample.eta) / f64::from(sample.pdf);
-        let weight = sample.f.cast::<f64>() * scale;
+        let weight = energy.weight(&sample);
         albedo += weight / count;
         if !sample.lobe.is_delta() {
-            smooth += weight.luminance() / (f64::from(sample.eta * sample.eta) * count);
+            smooth += weight.luminance() / count;
         }
         means[(i % REPLICATES) as usize] += weight.luminance() / f64::from(SAMPLES);
         squares += weight.luminance() * weight.luminance() / count;
@@ -201,7 +213,7 @@ fn estimate(bsdf: &Bsdf, angle: f64) -> (Estimate, Option<V3<f64>>) {
             *part += match sample.lobe.is_delta() {
                 true if sample.lobe == lobe => weight.luminance() / count,
                 true => 0.0,
-                false => f64::from(bsdf.eval_lobe(lobe, wo, sample.wi).luminance()) * scale / count,
+                false => energy.lobe(lobe, sample.wi).luminance() / (f64::from(sample.pdf) * count),
             };
         }
         match shares.iter_mut().find(|(lobe, _)| *lobe == sample.lobe) {

@@ -7,6 +7,7 @@
 
 mod chart;
 mod edit;
+mod energy;
 pub mod eval;
 mod gather;
 mod library;

@@ -1,6 +1,6 @@
 //! Integrals over directions that know nothing of the sampler, to hold it against.
 
-use crate::disney::Bsdf;
+use super::energy::Energy;
 use crate::math::V3;
 
 /// Steps of the angle from the axis, evenly in its logarithm.
@@ -13,7 +13,7 @@ const SMALLEST: f64 = 2e-5;
 /// Integrals over both hemispheres, apart from delta lobes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Integrals {
-    /// Of the luminance of f·|cos θi|: the albedo, in radiance.
+    /// Of the luminance of f·|cos θi|, by energy: the albedo.
     pub albedo: f64,
     /// Of the density: 1 less the samples that are lost or go to delta lobes.
     pub density: f64,
@@ -21,15 +21,16 @@ pub struct Integrals {
 
 /// Integrates about the mirror direction above the surface, and about `below` under it if something goes there, in rings whose
 /// radii grow geometrically.
-pub(super) fn integrate(bsdf: &Bsdf, wo: V3<f32>, below: Option<V3<f64>>) -> Integrals {
+pub(super) fn integrate(energy: &Energy<'_>, below: Option<V3<f64>>) -> Integrals {
+    let wo = energy.wo;
     let mirror = V3::new(-wo.x, -wo.y, wo.z).cast();
-    let upper = half(bsdf, wo, mirror, 1.0);
-    let lower = below.map_or_else(Integrals::default, |axis| half(bsdf, wo, axis, -1.0));
+    let upper = half(energy, mirror, 1.0);
+    let lower = below.map_or_else(Integrals::default, |axis| half(energy, axis, -1.0));
     Integrals { albedo: upper.albedo + lower.albedo, density: upper.density + lower.density }
 }
 
 /// The part on one side, `side` being the sign of z.
-fn half(bsdf: &Bsdf, wo: V3<f32>, axis: V3<f64>, side: f64) -> Integrals {
+fn half(energy: &Energy<'_>, axis: V3<f64>, side: f64) -> Integrals {
     // The axis lies near the plane of x and z, so it is never along y.
     let across = V3::new(0.0, 1.0, 0.0).cross(axis).normalize();
     let up = axis.cross(across);
@@ -48,9 +49,9 @@ fn half(bsdf: &Bsdf, wo: V3<f32>, axis: V3<f64>, side: f64) -> Integrals {
             if wi.z * side <= 0.0 {
                 continue;
             }
-            let (f, pdf) = bsdf.eval_with_pdf(wo, wi.cast());
-            sum.albedo += f64::from(f.luminance()) * wi.z.abs() * solid_angle;
-            sum.density += f64::from(pdf) * solid_angle;
+            let (value, density) = energy.value_and_density(wi.cast());
+            sum.albedo += value.luminance() * solid_angle;
+            sum.density += density * solid_angle;
         }
     }
     sum
@@ -61,12 +62,12 @@ mod tests {
     use super::super::measure::{direction, measure};
     use super::*;
     use crate::color::Rgb;
-    use crate::disney::{DiffuseModel, Masking, Params};
+    use crate::disney::{Bsdf, DiffuseModel, Masking, Params};
 
     #[test]
     fn lambert_reflects_its_colour() {
         let bsdf = Bsdf::diffuse(Rgb::grey(0.4));
-        let integrals = integrate(&bsdf, direction(-30.0), None);
+        let integrals = integrate(&Energy::new(&bsdf, direction(-30.0)), None);
         assert!(
             (integrals.albedo - 0.4).abs() < 1e-3 && (integrals.density - 1.0).abs() < 2e-3,
             "{integrals:?}"

@@ -4,7 +4,6 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::chart::{self, Albedo, Density, Heat, Polar, PolarPanel, color};
-use super::maps::{Map, maps};
 use super::measure::{Curve, Estimate, Measurements, measure};
 use super::sphere::{Picture, lit_sphere};
 use super::{InspectError, Subject, page};
@@ -37,7 +36,6 @@ pub struct Inspected {
     pub measurements: Measurements,
     /// The lit sphere.
     pub sphere: Picture,
-    maps: Vec<Map>,
 }
 
 /// Measures a material and renders its sphere; `control` follows and stops the render.
@@ -46,10 +44,8 @@ pub struct Inspected {
 /// If it can't be rendered.
 pub fn look(subject: Subject, options: Options, control: &Control) -> Result<Inspected, InspectError> {
     let measurements = measure(&subject.bsdf);
-    // Maps of two views show what there is to see: one near the normal, one near grazing.
-    let maps = maps(&subject.bsdf, &measurements.views[1..3]);
     let sphere = lit_sphere(&subject.material, options.size, options.spp, control)?;
-    Ok(Inspected { subject, measurements, sphere, maps })
+    Ok(Inspected { subject, measurements, sphere })
 }
 
 /// Writes the page, and beside it `sphere_NAME.png`, `polar_NAME.png`, `albedo_NAME.png` and `density_NAME.png` for each material;
@@ -78,7 +74,9 @@ pub fn write_report(path: &Path, inspected: &[Inspected]) -> Result<Vec<PathBuf>
         let colors = lobe_colors(inspected, &one.measurements.lobes);
         let (polar, albedo) = (one.polar(&colors), one.albedo(&colors));
         let density = Density { views: &one.measurements.views };
-        let heat = chart::picture(&Heat { maps: &one.maps }).ok().filter(|picture| !picture.rgb.is_empty());
+        let heat = chart::picture(&Heat { views: &one.measurements.views })
+            .ok()
+            .filter(|picture| !picture.rgb.is_empty());
         let sphere_png = write(format!("sphere_{name}.png"), &one.sphere)?;
         write(format!("polar_{name}.png"), &chart::picture(&polar)?)?;
         write(format!("albedo_{name}.png"), &chart::picture(&albedo)?)?;

@@ -52,7 +52,7 @@ where
     DB::ErrorType: 'static,
 {
     let scale = if view.estimate.smooth > 0.0 { 1.0 / view.estimate.smooth } else { 0.0 };
-    let wanted: Curve = view.total.iter().map(|&(a, v)| (a, v * scale)).collect();
+    let wanted: Curve = view.wanted.iter().map(|&(a, v)| (a, v * scale)).collect();
     let largest = wanted.iter().chain(&view.density).map(|p| p.1).fold(0.0, f64::max);
     let title = text_style(14.0, &INK, HPos::Left, VPos::Top);
     let heading = format!("viewer at {}°", view.angle);

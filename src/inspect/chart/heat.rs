@@ -6,6 +6,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{Drawing, FAINT, FINE, Figure, INK, text_style};
 use crate::inspect::maps::{COLUMNS, Map};
+use crate::inspect::measure::View;
 
 const WIDTH: u32 = 880;
 /// A map's columns in pixels.
@@ -31,15 +32,22 @@ const VIRIDIS: [[u8; 3]; 9] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// Pairs of maps, one a view.
+/// Pairs of maps, one a view that has them.
 pub(in super::super) struct Heat<'a> {
-    pub(in super::super) maps: &'a [Map],
+    pub(in super::super) views: &'a [View],
+}
+
+impl Heat<'_> {
+    /// Each map with what makes the integral of what is wanted 1.
+    fn maps(&self) -> impl Iterator<Item = (&Map, f64)> {
+        self.views.iter().filter_map(|view| Some((view.map.as_ref()?, 1.0 / view.estimate.smooth)))
+    }
 }
 
 impl Figure for Heat<'_> {
     fn size(&self) -> (u32, u32) {
         let height = |map: &Map| ABOVE + BELOW + CELL * map.rows as i32;
-        (WIDTH, self.maps.iter().map(height).sum::<i32>() as u32)
+        (WIDTH, self.maps().map(|(map, _)| height(map)).sum::<i32>() as u32)
     }
 
     fn draw<DB: DrawingBackend>(&self, area: &DrawingArea<DB, Shift>) -> Drawing<DB>
@@ -47,10 +55,11 @@ impl Figure for Heat<'_> {
         DB::ErrorType: 'static,
     {
         let mut top = 0;
-        for map in self.maps {
-            let largest = map.wanted.iter().chain(&map.density).copied().fold(0.0, f64::max);
+        for (map, scale) in self.maps() {
+            let wanted: Vec<f64> = map.wanted.iter().map(|v| v * scale).collect();
+            let largest = wanted.iter().chain(&map.density).copied().fold(0.0, f64::max);
             for (i, (name, values)) in
-                (0..).zip([("f·cos θ / albedo", &map.wanted), ("density of sampling", &map.density)])
+                (0..).zip([("f·cos θ / albedo", &wanted), ("density of sampling", &map.density)])
             {
                 let left = (WIDTH as i32 / 4 * (1 + 2 * i) - MAP_WIDTH / 2) * FINE;
                 let heading = format!("viewer at {}°: {name}", map.angle);
