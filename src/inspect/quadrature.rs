@@ -59,10 +59,10 @@ fn half(energy: &Energy<'_>, axis: V3<f64>, side: f64) -> Integrals {
 
 #[cfg(test)]
 mod tests {
-    use super::super::measure::{direction, measure};
     use super::*;
     use crate::color::Rgb;
     use crate::disney::{Bsdf, DiffuseModel, Masking, Params};
+    use crate::inspect::measure::{direction, measure};
 
     #[test]
     fn lambert_reflects_its_colour() {

@@ -11,14 +11,14 @@ const WIDTH: u32 = 880;
 const HEIGHT: u32 = 400;
 
 /// A chart over angles of incidence from 0° to 90°.
-pub(in super::super) struct Albedo {
+pub(crate) struct Albedo {
     /// Stacked on each other, each with its own height.
-    pub(in super::super) areas: Vec<(RGBColor, Curve)>,
+    pub(crate) areas: Vec<(RGBColor, Curve)>,
     /// With a mark at each angle.
-    pub(in super::super) lines: Vec<(RGBColor, Curve)>,
+    pub(crate) lines: Vec<(RGBColor, Curve)>,
     /// Thin ones.
-    pub(in super::super) channels: Vec<(RGBColor, Curve)>,
-    pub(in super::super) legend: Vec<(String, RGBColor)>,
+    pub(crate) channels: Vec<(RGBColor, Curve)>,
+    pub(crate) legend: Vec<(String, RGBColor)>,
 }
 
 impl Albedo {
@@ -56,7 +56,7 @@ impl Figure for Albedo {
             .x_labels(10)
             .y_labels(9)
             .x_label_formatter(&|x| format!("{x:.0}°"))
-            .y_label_formatter(&|y| super::super::subject::number(*y))
+            .y_label_formatter(&|y| crate::inspect::subject::number(*y))
             .x_desc("angle of incidence")
             .y_desc("albedo")
             .axis_desc_style(text_style(13.0, &INK, HPos::Center, VPos::Center))

@@ -16,8 +16,8 @@ const DECADES: [f64; 2] = [3.0, 6.0];
 const EDGE: f64 = 6.0;
 
 /// Panels of log scale, one a view.
-pub(in super::super) struct Density<'a> {
-    pub(in super::super) views: &'a [View],
+pub(crate) struct Density<'a> {
+    pub(crate) views: &'a [View],
 }
 
 impl Density<'_> {

@@ -33,8 +33,8 @@ const VIRIDIS: [[u8; 3]; 9] = [
 ];
 
 /// Pairs of maps, one a view that has them.
-pub(in super::super) struct Heat<'a> {
-    pub(in super::super) views: &'a [View],
+pub(crate) struct Heat<'a> {
+    pub(crate) views: &'a [View],
 }
 
 impl Heat<'_> {

@@ -19,19 +19,19 @@ const BELOW: i32 = 34;
 const LINEAR: f64 = 0.01;
 
 /// Slices from several angles with one scale.
-pub(in super::super) struct Polar<'a> {
-    pub(in super::super) panels: Vec<PolarPanel<'a>>,
-    pub(in super::super) legend: Vec<(String, RGBColor)>,
+pub(crate) struct Polar<'a> {
+    pub(crate) panels: Vec<PolarPanel<'a>>,
+    pub(crate) legend: Vec<(String, RGBColor)>,
 }
 
 /// The slice from one angle.
-pub(in super::super) struct PolarPanel<'a> {
+pub(crate) struct PolarPanel<'a> {
     /// The angle of incidence in degrees.
-    pub(in super::super) angle: f64,
+    pub(crate) angle: f64,
     /// In 1/sr against degrees.
-    pub(in super::super) curves: Vec<(RGBColor, &'a Curve)>,
+    pub(crate) curves: Vec<(RGBColor, &'a Curve)>,
     /// Delta lobes: their angle in degrees, and the fraction of light.
-    pub(in super::super) spikes: Vec<(RGBColor, f64, f64)>,
+    pub(crate) spikes: Vec<(RGBColor, f64, f64)>,
 }
 
 impl Polar<'_> {
