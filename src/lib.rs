@@ -29,7 +29,7 @@
 //! | floor | modules |
 //! |---|---|
 //! | 8 | [`cli`] |
-//! | 7 | [`check`] |
+//! | 7 | [`check`], [`inspect`] |
 //! | 6 | [`sweep`] |
 //! | 5 | [`job`], [`report`] |
 //! | 4 | [`render`], [`compare`], [`output`] |
@@ -50,6 +50,7 @@ pub mod convert;
 pub mod disney;
 pub mod imagefile;
 pub mod import;
+pub mod inspect;
 pub mod job;
 pub mod light;
 pub mod manifest;

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 /// Every module of the crate with its floor, in tenths: a module uses only floors below its own. `color` lies on the ground floor
 /// but above `math`, whose float type it is generic over; `settings` are part of a record.
-const FLOORS: [(&str, u32); 24] = [
+const FLOORS: [(&str, u32); 25] = [
     ("cli", 80),
     ("check", 70),
+    ("inspect", 70),
     ("sweep", 60),
     ("job", 50),
     ("report", 50),

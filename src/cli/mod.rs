@@ -4,6 +4,7 @@
 mod accept;
 mod completions;
 mod diff;
+mod inspect;
 mod progress;
 mod render;
 mod schema;
@@ -54,6 +55,7 @@ enum Command {
     Sweep(sweep::Arguments),
     Accept(accept::Arguments),
     Diff(diff::Arguments),
+    Inspect(inspect::Arguments),
     Schema(schema::Arguments),
     Completions(completions::Arguments),
 }
@@ -90,6 +92,7 @@ fn run(arguments: &Arguments) -> Outcome {
         Command::Sweep(command) => sweep::run(command, talk),
         Command::Accept(command) => accept::run(command, talk),
         Command::Diff(command) => diff::run(command, talk),
+        Command::Inspect(command) => inspect::run(command, talk),
         Command::Schema(command) => schema::run(command),
         Command::Completions(command) => completions::run(command),
     }
@@ -118,8 +121,13 @@ fn tell(text: &str) {
 
 /// Text to stdout. A reader that has gone away, as `head` does, ends the output and is no error.
 fn print(text: &str) -> Result<(), std::io::Error> {
+    print_bytes(text.as_bytes())
+}
+
+/// The same for what need not be UTF-8.
+fn print_bytes(bytes: &[u8]) -> Result<(), std::io::Error> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
     }

@@ -79,7 +79,7 @@ pub(super) struct Arguments {
 }
 
 /// A value of an enum by its name in files.
-fn parse_enum<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+pub(super) fn parse_enum<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     serde_json::from_value(serde_json::Value::String(text.to_owned())).map_err(|error| error.to_string())
 }
 

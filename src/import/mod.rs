@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 pub use aris::ArisError;
+pub(crate) use aris::yaml;
 pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
 pub use images::{EnvironmentError, read_environment};

@@ -83,7 +83,7 @@ pub(super) fn job_name<'a>(parts: impl Iterator<Item = (&'a str, &'a str)>) -> S
 }
 
 /// A name alone, as a file's name.
-pub(super) fn plain_name(name: &str) -> String {
+pub(crate) fn plain_name(name: &str) -> String {
     let safe = safe(name);
     // A name such as `..` or `.x` would be special, and a contact sheet has names of its own.
     let lower = safe.to_lowercase();

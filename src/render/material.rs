@@ -59,6 +59,14 @@ enum Tangent {
     },
 }
 
+/// The BSDF of a material that is the same everywhere, `None` for one that varies.
+pub fn constant_bsdf(material: &Material) -> Option<Bsdf> {
+    match PreparedMaterial::new(material).bsdf {
+        Scattering::Constant(bsdf) => Some(*bsdf),
+        Scattering::Varying(_) => None,
+    }
+}
+
 impl PreparedMaterial {
     pub(super) fn new(material: &Material) -> Self {
         let colors = [

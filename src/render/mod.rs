@@ -19,6 +19,7 @@ use crate::accel::BuildError;
 
 pub use film::{Control, Rendered, render};
 pub use geometry::Geometry;
+pub use material::constant_bsdf;
 pub use offset::Departure;
 pub use path::{Replay, ReplayVertex, replay};
 pub use prepare::{Prepared, image_size};

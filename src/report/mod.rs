@@ -6,7 +6,7 @@
 
 mod canvas;
 mod draw;
-mod font;
+pub(crate) mod font;
 mod layout;
 
 mod page;

@@ -280,6 +280,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::scene::material::TextureChannel;
     use crate::scene::{Instance, MaterialId, MeshId, Named, TextureId};
 
     #[test]

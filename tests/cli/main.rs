@@ -7,6 +7,7 @@ mod configs;
 mod determinism;
 mod diff;
 mod failures;
+mod inspect;
 mod manifests;
 mod references;
 mod render;

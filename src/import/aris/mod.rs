@@ -7,7 +7,7 @@
 
 mod compose;
 mod scene;
-mod yaml;
+pub(crate) mod yaml;
 
 use std::path::Path;
 

@@ -13,17 +13,17 @@ const MAX_BYTES: usize = 1 << 20;
 
 /// A value with its place.
 #[derive(Clone, Debug)]
-pub(super) struct Node {
-    pub place: Place,
-    pub value: Value,
+pub(crate) struct Node {
+    pub(crate) place: Place,
+    pub(crate) value: Value,
 }
 
 /// Where something stands.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
-    pub file: Arc<str>,
-    pub line: u64,
-    pub column: u64,
+pub(crate) struct Place {
+    pub(crate) file: Arc<str>,
+    pub(crate) line: u64,
+    pub(crate) column: u64,
 }
 
 impl fmt::Display for Place {
@@ -34,9 +34,9 @@ impl fmt::Display for Place {
 
 /// What a node holds.
 #[derive(Clone, Debug)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Null,
-    Bool,
+    Bool(bool),
     Number(f64),
     Text(String),
     List(Vec<Node>),
@@ -45,7 +45,7 @@ pub(super) enum Value {
 }
 
 /// Reads one document.
-pub(super) fn parse(file: &str, bytes: &[u8]) -> Result<Node, ArisError> {
+pub(crate) fn parse(file: &str, bytes: &[u8]) -> Result<Node, ArisError> {
     if bytes.len() > MAX_BYTES {
         return Err(ArisError::TooLarge { file: file.to_owned(), size: bytes.len(), max: MAX_BYTES });
     }
@@ -70,7 +70,7 @@ pub(super) fn parse(file: &str, bytes: &[u8]) -> Result<Node, ArisError> {
 #[derive(Debug)]
 enum Raw {
     Null,
-    Bool,
+    Bool(bool),
     Number(f64),
     Text(String),
     List(Vec<Spanned<Raw>>),
@@ -104,8 +104,8 @@ impl<'de> Visitor<'de> for RawVisitor {
         deserializer.deserialize_any(self)
     }
 
-    fn visit_bool<E>(self, _: bool) -> Result<Raw, E> {
-        Ok(Raw::Bool)
+    fn visit_bool<E>(self, value: bool) -> Result<Raw, E> {
+        Ok(Raw::Bool(value))
     }
 
     fn visit_i64<E>(self, value: i64) -> Result<Raw, E> {
@@ -155,7 +155,7 @@ fn located(raw: Spanned<Raw>, file: &Arc<str>) -> Node {
     let at = place(&raw.referenced);
     let value = match raw.value {
         Raw::Null => Value::Null,
-        Raw::Bool => Value::Bool,
+        Raw::Bool(value) => Value::Bool(value),
         Raw::Number(value) => Value::Number(value),
         Raw::Text(text) => Value::Text(text),
         Raw::List(items) => Value::List(items.into_iter().map(|item| located(item, file)).collect()),
@@ -174,7 +174,7 @@ impl Value {
     fn kind(&self) -> &'static str {
         match self {
             Self::Null => "nothing",
-            Self::Bool => "true or false",
+            Self::Bool(_) => "true or false",
             Self::Number(_) => "a number",
             Self::Text(_) => "text",
             Self::List(_) => "a list",

@@ -1,0 +1,176 @@
+//! What `-p NAME=VALUE` and the fields of a material library say.
+
+use std::path::Path;
+
+use super::InspectError;
+use crate::manifest::edit::{self, BoxedError, EditError, MaterialField};
+use crate::manifest::nearest::nearest;
+use crate::record::Value;
+use crate::scene::{Image, Material, Named, Scene};
+use crate::settings::RenderSettings;
+
+/// A field of a material with its values; more than one make variants to compare.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Edit {
+    /// The field.
+    pub field: MaterialField,
+    /// At least one.
+    pub values: Vec<Value>,
+}
+
+impl Edit {
+    /// Reads `NAME=VALUE` or `NAME=VALUE,VALUE…`, each value as in TOML, and text without quotes where it is no TOML. Three numbers
+    /// for a colour are one value.
+    ///
+    /// # Errors
+    /// If there is no `=`, no value, or no such field.
+    pub fn parse(text: &str) -> Result<Self, InspectError> {
+        let malformed = || InspectError::MalformedEdit { text: text.to_owned() };
+        let (name, values) = text.split_once('=').ok_or_else(malformed)?;
+        let field = field(name.trim()).map_err(InspectError::Edit)?;
+        let values: Vec<Value> =
+            split(values).into_iter().map(value).collect::<Option<_>>().ok_or_else(malformed)?;
+        let is_color = matches!(field, MaterialField::BaseColor | MaterialField::EmissionColor);
+        let one_color = is_color && values.len() == 3 && values.iter().all(|v| matches!(v, Value::Number(_)));
+        Ok(Self { field, values: if one_color { vec![Value::List(values)] } else { values } })
+    }
+}
+
+/// The field of that name, in snake_case, camelCase or as Aris calls it.
+///
+/// # Errors
+/// [`EditError::UnknownField`].
+pub(super) fn field(name: &str) -> Result<MaterialField, EditError> {
+    let plain = |name: &str| -> String {
+        name.chars().filter(|c| !matches!(c, '_' | '-' | ' ')).flat_map(char::to_lowercase).collect()
+    };
+    let wanted = plain(name);
+    let found = match wanted.as_str() {
+        "color" => Some(MaterialField::BaseColor),
+        "g" => Some(MaterialField::Masking),
+        _ => MaterialField::ALL.iter().copied().find(|f| plain(f.name()) == wanted),
+    };
+    found.ok_or_else(|| {
+        let known: Vec<&'static str> = MaterialField::ALL.iter().map(|f| f.name()).collect();
+        EditError::UnknownField {
+            of: "a material",
+            field: name.chars().take(80).collect(),
+            nearest: nearest(name, known.iter().copied()),
+            known,
+        }
+    })
+}
+
+/// Sets a field of a material.
+///
+/// # Errors
+/// If the value does not suit the field; messages call it by its name alone.
+pub(super) fn set(material: &mut Material, field: MaterialField, value: &Value) -> Result<(), EditError> {
+    let mut scene = Scene::empty();
+    scene.materials.push(Named::new("material", std::mem::take(material)));
+    let path = format!("material.material.{}", field.name());
+    let mut no_image = |_: &Path| -> Result<Image, BoxedError> { Err("a material has no image".into()) };
+    let result = edit::apply(&mut scene, &mut RenderSettings::default(), &path, value, &mut no_image);
+    if let Some(edited) = scene.materials.pop() {
+        *material = edited.item;
+    }
+    result.map_err(|error| match error {
+        EditError::Value { found, expected, .. } => {
+            EditError::Value { path: field.name().to_owned(), found, expected }
+        }
+        EditError::NotApplicable { why, .. } => {
+            EditError::NotApplicable { path: field.name().to_owned(), why }
+        }
+        other => other,
+    })
+}
+
+/// The parts of `text` between commas that are outside brackets and quotes.
+fn split(text: &str) -> Vec<&str> {
+    let (mut depth, mut quote, mut start) = (0u32, None, 0);
+    let mut parts = Vec::new();
+    for (i, c) in text.char_indices() {
+        match (quote, c) {
+            (Some(q), _) if q == c => quote = None,
+            (Some(_), _) => {}
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '[') => depth += 1,
+            (None, ']') => depth = depth.saturating_sub(1),
+            (None, ',') if depth == 0 => {
+                parts.push(text[start..i].trim());
+                start = i + 1;
+            }
+            (None, _) => {}
+        }
+    }
+    parts.push(text[start..].trim());
+    parts
+}
+
+/// A value as in TOML, or the text as it stands; `None` if there is nothing, or a table or a date.
+fn value(text: &str) -> Option<Value> {
+    if text.is_empty() {
+        return None;
+    }
+    // Also `.5` and `1.`, which TOML has not.
+    if let Ok(number) = text.parse() {
+        return Some(Value::Number(number));
+    }
+    match format!("v = {text}").parse::<toml::Table>() {
+        Ok(mut table) => from_toml(table.remove("v")?),
+        Err(_) => Some(Value::Text(text.to_owned())),
+    }
+}
+
+fn from_toml(value: toml::Value) -> Option<Value> {
+    Some(match value {
+        toml::Value::Boolean(b) => Value::Bool(b),
+        toml::Value::Integer(i) => Value::Number(i as f64),
+        toml::Value::Float(f) => Value::Number(f),
+        toml::Value::String(s) => Value::Text(s),
+        toml::Value::Array(items) => Value::List(items.into_iter().map(from_toml).collect::<Option<_>>()?),
+        toml::Value::Table(_) | toml::Value::Datetime(_) => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::disney::Parameter;
+
+    fn values(text: &str) -> Vec<Value> {
+        Edit::parse(text).unwrap().values
+    }
+
+    #[test]
+    fn lists_are_variants_and_colours_are_one_value() {
+        assert_eq!(values("roughness=0.1, 0.3"), [Value::Number(0.1), Value::Number(0.3)]);
+        let red = Value::List([0.9, 0.1, 0.1].map(Value::Number).to_vec());
+        assert_eq!(values("color=0.9,0.1,0.1"), std::slice::from_ref(&red));
+        assert_eq!(values("baseColor=[0.9, 0.1, 0.1], #aabbcc"), [red, Value::Text("#aabbcc".into())]);
+        assert_eq!(values("model=mirror,disney").len(), 2);
+        for wrong in ["roughness", "roughness=", "roughness=0.1,,0.2", "roughness=1999-01-01"] {
+            assert!(matches!(Edit::parse(wrong), Err(InspectError::MalformedEdit { .. })), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn every_parameter_is_found_in_both_spellings_and_slips_find_the_name() {
+        for parameter in Parameter::ALL {
+            assert_eq!(field(parameter.name()).unwrap().name(), parameter.name());
+        }
+        assert_eq!(field("clearcoatGloss").unwrap(), MaterialField::ClearcoatGloss);
+        let error = field("rougness").unwrap_err();
+        assert!(error.hint().unwrap().contains("did you mean `roughness`?"));
+    }
+
+    #[test]
+    fn a_value_out_of_range_is_told_by_the_field_s_name() {
+        let mut material = Material::default();
+        set(&mut material, MaterialField::Roughness, &Value::Number(0.25)).unwrap();
+        assert_eq!(material.scalar(Parameter::Roughness).constant(), Some(0.25));
+        let error = set(&mut material, MaterialField::Roughness, &Value::Number(1.5)).unwrap_err();
+        assert_eq!(error.to_string(), "`roughness` is 1.5, but must be a number in [0, 1]");
+        assert_eq!(material.scalar(Parameter::Roughness).constant(), Some(0.25), "the rest stays");
+    }
+}
