@@ -5,7 +5,8 @@ use crate::math::{Real, V3};
 
 /// Two directions above the surface with the terms all lobes share.
 ///
-/// Terms are symmetric in the two directions to the last bit, whatever their lengths.
+/// All terms but Schlick's weight are symmetric in the two directions to the last bit. The weight is as far as both have unit length: in
+/// `f32` reciprocity holds to 10⁻⁶/|wo + wi|².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pair<F> {
     /// To the viewer.
@@ -39,11 +40,13 @@ impl<F: Real> Pair<F> {
         // The mean of the two directions' cosines with the half vector. They differ where rounding left the lengths unequal, and one of
         // them is negative then if the directions are nearly opposite.
         let cos_d = F::of(0.5) * sum2.sqrt();
-        let one_minus_cos_d = if cos_d > F::of(0.5) {
+        // Schlick's weight is that of the light's own cosine, as in disney.brdf: dot(L, H).
+        let cos_i = (wi.dot(sum) / sum2.sqrt()).max(F::ZERO);
+        let one_minus_cos_i = if cos_i > F::of(0.5) {
             // = sin² θd/(1 + cos θd) with sin θd = |wo - wi|/2: no cancellation near θd = 0.
-            F::of(0.25) * (wo - wi).length_squared() / (F::ONE + cos_d)
+            F::of(0.25) * (wo - wi).length_squared() / (F::ONE + cos_i)
         } else {
-            F::ONE - cos_d
+            F::ONE - cos_i
         };
         Some(Self {
             wo,
@@ -52,7 +55,7 @@ impl<F: Real> Pair<F> {
             sum2,
             cos_d,
             cos2_d: cos_d.sqr(),
-            edge: Edge::given_both(cos_d, one_minus_cos_d),
+            edge: Edge::given_both(cos_i, one_minus_cos_i),
         })
     }
 }
