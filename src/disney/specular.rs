@@ -54,10 +54,11 @@ impl<F: Real> Schlick<F> {
 
     /// 1 - F0, which may be negative, and 1 - F90 of the base without an interface: no cancellation where either nears 1.
     pub(super) fn complement(params: &Params<F>, tint: Rgb<F>) -> Self {
-        let Params { metallic, f90, base_color, .. } = *params;
-        let less = |color: Rgb<F>, weight| (Rgb::WHITE - color) * weight;
+        let Params { metallic, f90, base_color, specular_tint, .. } = *params;
+        let grey = F::of(0.08) * params.specular;
+        let dielectric = Rgb::grey(F::ONE - grey) + (Rgb::WHITE - tint) * (grey * specular_tint);
         Self {
-            f0: less(dielectric_f0(params, tint), F::ONE - metallic) + less(base_color, metallic),
+            f0: dielectric * (F::ONE - metallic) + (Rgb::WHITE - base_color) * metallic,
             f90: (F::ONE - f90) * (F::ONE - metallic),
         }
     }

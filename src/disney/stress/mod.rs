@@ -280,7 +280,7 @@ impl fmt::Display for Report {
         )?;
         for (i, (name, r)) in self.roundings().enumerate() {
             let value = LOBES.get(i).map_or(Value::Pdf, |&lobe| Value::Lobe(lobe));
-            let there = r.error.at.map_or(0.0, |case| explained(&case, value));
+            let there = r.error.at.map_or(0.0, |case| explained(&case, value, r.error.value));
             writeln!(
                 f,
                 "{name:22}{:>10}{:>14.2e}{there:>12.2e}{:>20.2}",

@@ -162,35 +162,36 @@ impl Random {
 }
 
 impl Material<f64> {
-    /// Every input that isn't 0 or 1, which are exact, moved to one of the ends of the interval that `f32` rounds to it, at random.
-    pub(super) fn nudged(mut self, random: &mut Random) -> Self {
+    /// Every input that isn't 0 or 1, which are exact, moved up or down, at random, by `halves` times half a unit in the last place
+    /// of `f32`.
+    pub(super) fn nudged(mut self, random: &mut Random, halves: f64) -> Self {
         for p in Parameter::ALL {
             let value = self.params.get_mut(p);
-            *value = random.nudged(*value);
+            *value = random.nudged(*value, halves);
         }
-        self.params.base_color = random.nudged_color(self.params.base_color);
-        self.params.transmission_color = self.params.transmission_color.map(|c| random.nudged_color(c));
-        self.params.diff_trans_color = self.params.diff_trans_color.map(|c| random.nudged_color(c));
+        self.params.base_color = random.nudged_color(self.params.base_color, halves);
+        self.params.transmission_color =
+            self.params.transmission_color.map(|c| random.nudged_color(c, halves));
+        self.params.diff_trans_color = self.params.diff_trans_color.map(|c| random.nudged_color(c, halves));
         self
     }
 }
 
 impl Random {
-    /// `value`, which is an `f32`, moved up or down by half a unit in the last place of that type.
-    fn nudged(&mut self, value: f64) -> f64 {
+    fn nudged(&mut self, value: f64, halves: f64) -> f64 {
         let single = value as f32;
         if single == 0.0 || single == 1.0 {
             return value;
         }
         let neighbour = if self.bits() >> 63 == 0 { single.next_up() } else { single.next_down() };
-        0.5 * (value + f64::from(neighbour))
+        value + 0.5 * halves * (f64::from(neighbour) - value)
     }
 
-    fn nudged_color(&mut self, color: Rgb<f64>) -> Rgb<f64> {
-        Rgb::new(self.nudged(color.r), self.nudged(color.g), self.nudged(color.b))
+    fn nudged_color(&mut self, color: Rgb<f64>, halves: f64) -> Rgb<f64> {
+        color.to_array().map(|channel| self.nudged(channel, halves)).into()
     }
 
-    pub(super) fn nudged_direction(&mut self, w: V3<f64>) -> V3<f64> {
-        V3::new(self.nudged(w.x), self.nudged(w.y), self.nudged(w.z))
+    pub(super) fn nudged_direction(&mut self, w: V3<f64>, halves: f64) -> V3<f64> {
+        V3::new(self.nudged(w.x, halves), self.nudged(w.y, halves), self.nudged(w.z, halves))
     }
 }

@@ -1,6 +1,6 @@
 //! `f32` against `f64`: how far apart they are, and how much of that the rounding of the inputs explains.
 
-use super::{Case, Worst, random::Random};
+use super::{Case, LARGEST_RATIO, Worst, random::Random};
 use crate::color::Rgb;
 use crate::disney::{Bsdf, Lobe};
 use crate::math::V3;
@@ -44,7 +44,7 @@ impl Rounding {
         self.error.raise(error, case);
         // The rest is expensive, and rarely decides.
         if error > self.ratio.value * LEAST_EXPLAINED {
-            self.ratio.raise(error / explained(case, value), case);
+            self.ratio.raise(error / explained(case, value, error), case);
         }
     }
 }
@@ -58,18 +58,31 @@ fn difference(a: Rgb<f64>, b: Rgb<f64>) -> f64 {
     })
 }
 
-/// How far the `f64` value moves where each input is moved by half a unit in the last place of `f32`, up or down at random, the
-/// largest of [`TRIALS`]; and [`LEAST_EXPLAINED`].
-pub(super) fn explained(case: &Case, value: Value) -> f64 {
+/// What explains a difference: how far the `f64` value moves with its inputs, and [`LEAST_EXPLAINED`].
+///
+/// Where that isn't enough there may be a step nearby, such as where facets turn to the other side: `f32` may be on its other side if
+/// inputs moved ten times as far are, which counts a tenth.
+pub(super) fn explained(case: &Case, value: Value, error: f64) -> f64 {
+    let near = LEAST_EXPLAINED + moved(case, value, 1.0);
+    if error <= LARGEST_RATIO * near {
+        near
+    } else {
+        near.max(LEAST_EXPLAINED + moved(case, value, 10.0) / 10.0)
+    }
+}
+
+/// How far the `f64` value moves where each input is moved by `halves` times half a unit in the last place of `f32`, up or down at
+/// random: the largest of [`TRIALS`].
+fn moved(case: &Case, value: Value, halves: f64) -> f64 {
     let (material, wo, wi) = (case.material.cast::<f64>(), case.wo.cast(), case.wi.cast());
     let exact = value.of(&material.bsdf(), wo, wi);
-    let moved = (0..TRIALS).map(|trial| {
+    let differences = (0..TRIALS).map(|trial| {
         let mut random = Random::new(trial);
-        let bsdf = material.nudged(&mut random).bsdf();
-        let (wo, wi) = (random.nudged_direction(wo), random.nudged_direction(wi));
+        let bsdf = material.nudged(&mut random, halves).bsdf();
+        let (wo, wi) = (random.nudged_direction(wo, halves), random.nudged_direction(wi, halves));
         difference(value.of(&bsdf, wo, wi), exact)
     });
-    LEAST_EXPLAINED + moved.fold(0.0, f64::max)
+    differences.fold(0.0, f64::max)
 }
 
 impl Value {
