@@ -9,7 +9,7 @@
 //! - its weight, the largest channel of f·|cos θi|/pdf, stays below [`Bsdf::weight_bound`], a function of the angle for each lobe;
 //! - `f32` agrees with the `f64` instantiation of the same source to ten times what rounding the inputs explains: the largest change
 //!   of the `f64` value where each parameter (but 0 and 1) and each component of the directions is moved by half a unit in the last
-//!   place of `f32`, up or down in 32 random ways, and two epsilons. Values below 10⁻³⁰ count as 0: a lobe of strength 10⁻⁴⁰ has
+//!   place of `f32`, up or down in 32 random ways, and two epsilons. Values below 10⁻²⁵ count as 0: a lobe of strength 10⁻⁴⁰ has
 //!   no 24 bits. Nor are weights and densities compared where a lobe is that dim.
 
 mod random;

@@ -5,8 +5,8 @@ use crate::color::Rgb;
 use crate::disney::{Bsdf, Lobe};
 use crate::math::V3;
 
-/// Values below this in both types are equal; so are densities where the whole BSDF is.
-const NEGLIGIBLE: f64 = 1e-30;
+/// Values below this in both types are equal: what a lobe of denormal strength, below 10⁻³⁸, may reach at a peak of 10¹².
+const NEGLIGIBLE: f64 = 1e-25;
 /// Random ways to round the inputs.
 const TRIALS: u64 = 32;
 /// What is explained even if no input matters, in epsilons of `f32`.
