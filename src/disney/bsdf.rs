@@ -200,6 +200,17 @@ impl<F: Real> Bsdf<F> {
         }
     }
 
+    /// The largest channel that a sample's weight f·|cos θi|/pdf may have, rounding aside, if `lobe` was sampled from `wo`: a function
+    /// of the angle, derived in `bound` and tested by [`super::stress`].
+    pub fn weight_bound(&self, wo: V3<F>, lobe: Lobe) -> F {
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.weight_bound(wo, lobe),
+            Kind::Lambert { base_color } => base_color.max_channel(),
+            Kind::Dielectric(dielectric) if lobe.is_transmission() => F::ONE / dielectric.eta(wo).sqr(),
+            Kind::Mirror | Kind::Dielectric(_) => F::ONE,
+        }
+    }
+
     /// Nothing but delta lobes: next-event estimation can't find light here.
     #[inline]
     pub fn is_delta(&self) -> bool {

@@ -43,9 +43,16 @@ impl<F: Real> Clearcoat<F> {
         let d = self.distribution.density(pair);
         let alpha = F::of(MASKING_ALPHA);
         let masking = smith_isotropic(pair.wo.z, alpha) * smith_isotropic(pair.wi.z, alpha);
-        let fresnel = F::of(F0) + F::of(1.0 - F0) * pair.schlick;
+        let fresnel = F::of(F0) + F::of(1.0 - F0) * pair.edge.weight;
         // hz/(4 cos θd) = sum.z/|sum| / (2|sum|).
         (self.strength * masking * fresnel * d, F::of(0.5) * d * pair.sum.z / pair.sum2)
+    }
+
+    /// The largest weight of a sample; see `bound`.
+    pub(super) fn weight_bound(&self, mu: F) -> F {
+        let alpha = F::of(MASKING_ALPHA);
+        let root = mu.sqrt() + alpha.sqrt();
+        self.strength * F::of(8.0 * F0) * smith_isotropic(mu, alpha) / root.sqr()
     }
 
     /// `wo` mirrored at a normal of GTR1; may lie below the horizon.

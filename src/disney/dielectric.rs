@@ -20,13 +20,19 @@ pub(super) struct Dielectric<F> {
 }
 
 impl<F: Real> Dielectric<F> {
+    /// The index on the far side over that of the side that `wo` is on.
+    #[inline]
+    pub(super) fn eta(&self, wo: V3<F>) -> F {
+        if wo.z > F::ZERO { self.ior } else { F::ONE / self.ior }
+    }
+
     /// Reflection with probability F, else refraction by Snell's law.
     ///
     /// Transmitted *radiance* changes by 1/eta², since light is squeezed into (or out of) a cone: L/η² is what stays (Veach 1997,
     /// section 5.2).
     #[inline]
     pub(super) fn sample(&self, wo: V3<F>, u_lobe: F) -> Option<BsdfSample<F>> {
-        let eta = if wo.z > F::ZERO { self.ior } else { F::ONE / self.ior };
+        let eta = self.eta(wo);
         let split = dielectric_split(wo.z.abs(), eta);
         if u_lobe < split.reflectance {
             let wi = V3::new(-wo.x, -wo.y, wo.z);
@@ -42,7 +48,9 @@ impl<F: Real> Dielectric<F> {
 /// `wo` refracted by the plane z = 0 at an angle of the cosine `cos_t`, into a medium of `eta` times the refractive index.
 #[inline]
 pub(super) fn refracted<F: Real>(wo: V3<F>, cos_t: F, eta: F) -> V3<F> {
-    V3::new(-wo.x / eta, -wo.y / eta, (-cos_t).copysign(-wo.z))
+    let wi = V3::new(-wo.x / eta, -wo.y / eta, (-cos_t).copysign(-wo.z));
+    // A thinner medium magnifies what `wo` lacks in length.
+    if eta < F::ONE { wi.normalize() } else { wi }
 }
 
 /// The sample of a delta lobe that passes on `factor` with probability `pdf`: f is `factor`/|cos θi|. `None` where cos θi is so small that

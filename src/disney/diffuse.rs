@@ -1,6 +1,6 @@
 //! The diffuse lobe: Burley's, Lambert's or glTF's, with the subsurface blend.
 
-use super::fresnel::schlick_weight;
+use super::fresnel::{Edge, schlick_weight};
 use super::pair::Pair;
 use super::parameter::{DiffuseModel, Params};
 use super::specular::Schlick;
@@ -12,12 +12,11 @@ use crate::math::{Real, V3};
 pub(super) struct Diffuse<F> {
     /// base_color·(1 - metallic)(1 - spec_trans)(1 - diff_trans/2)/π.
     color: Rgb<F>,
-    /// F0 and F90 of the base's highlight, for [`DiffuseModel::LambertFresnel`].
-    f0: Rgb<F>,
-    f90: F,
-    roughness: F,
-    subsurface: F,
-    model: DiffuseModel,
+    /// 1 - F0 and 1 - F90 of the base's highlight, for [`DiffuseModel::LambertFresnel`].
+    left: Schlick<F>,
+    pub(super) roughness: F,
+    pub(super) subsurface: F,
+    pub(super) model: DiffuseModel,
     // Coefficients of `albedos`, for the plain shape and for the subsurface's.
     plain: F,
     plain_rise: F,
@@ -26,14 +25,17 @@ pub(super) struct Diffuse<F> {
 }
 
 impl<F: Real> Diffuse<F> {
-    /// `None` where the lobe reflects nothing. `highlight` is the base's.
-    pub(super) fn new(params: &Params<F>, highlight: Schlick<F>, model: DiffuseModel) -> Option<Self> {
-        let Schlick { f0, f90 } = highlight;
+    /// `None` where the lobe reflects nothing. `left` is what the base's highlight leaves, 1 - F0 and 1 - F90.
+    pub(super) fn new(params: &Params<F>, left: Schlick<F>, model: DiffuseModel) -> Option<Self> {
         let kept = params.diffuse_part() * (F::ONE - F::of(0.5) * params.diff_trans);
         let reflectance = params.base_color * kept;
         let diffuse_part = match model {
             DiffuseModel::Burley | DiffuseModel::Lambert => reflectance,
-            DiffuseModel::LambertFresnel => reflectance * f0.map(|f0| (F::ONE - f0).max(F::ZERO)),
+            DiffuseModel::LambertFresnel => {
+                // Schlick's weight has a mean of about 1/20; with F0 ≥ 1 > F90 all that is left is at grazing angles.
+                let at_edge = left.f90 * F::of(0.05);
+                reflectance * left.f0.map(|left| left.max(F::ZERO) + at_edge)
+            }
         };
         let mean = diffuse_part.mean();
         if mean == F::ZERO {
@@ -47,8 +49,7 @@ impl<F: Real> Diffuse<F> {
         let flat = mean * params.subsurface;
         Some(Self {
             color: reflectance * F::FRAC_1_PI,
-            f0,
-            f90,
+            left,
             roughness: params.roughness,
             subsurface: params.subsurface,
             model,
@@ -74,6 +75,14 @@ impl<F: Real> Diffuse<F> {
         (plain + flat - uniform, uniform)
     }
 
+    /// What the shape is multiplied with, where the highlight leaves most.
+    pub(super) fn largest_color(&self) -> Rgb<F> {
+        match self.model {
+            DiffuseModel::Burley | DiffuseModel::Lambert => self.color,
+            DiffuseModel::LambertFresnel => self.color * self.left.f0.map(|left| left.max(self.left.f90)),
+        }
+    }
+
     /// The BRDF.
     ///
     /// Burley 2012, section 5.3, and the subsurface shape of section 5.3's end, inspired by Hanrahan and Krueger. The blend towards it
@@ -85,7 +94,7 @@ impl<F: Real> Diffuse<F> {
     pub(super) fn eval(&self, pair: &Pair<F>) -> Rgb<F> {
         let mut shape = F::ONE;
         if self.model == DiffuseModel::Burley || self.subsurface > F::ZERO {
-            let fresnel = [schlick_weight(pair.wi.z), schlick_weight(pair.wo.z)];
+            let fresnel = [Edge::at(pair.wi.z), Edge::at(pair.wo.z)];
             let retro = pair.cos2_d * self.roughness;
             if self.model == DiffuseModel::Burley {
                 shape = both_ways(F::of(0.5) + F::of(2.0) * retro, fresnel);
@@ -100,8 +109,7 @@ impl<F: Real> Diffuse<F> {
             DiffuseModel::Burley | DiffuseModel::Lambert => color,
             DiffuseModel::LambertFresnel => {
                 // 1 - lerp(F0, F90, weight).
-                let at_edge = (F::ONE - self.f90) * pair.schlick;
-                let left = self.f0.map(|f0| (F::ONE - f0) * (F::ONE - pair.schlick) + at_edge);
+                let left = self.left.f0 * pair.edge.rest + Rgb::grey(self.left.f90 * pair.edge.weight);
                 color * left.map(|f| f.max(F::ZERO))
             }
         }
@@ -110,7 +118,6 @@ impl<F: Real> Diffuse<F> {
 
 /// lerp(1, f90, FL)·lerp(1, f90, FV).
 #[inline]
-fn both_ways<F: Real>(f90: F, [fl, fv]: [F; 2]) -> F {
-    let rise = f90 - F::ONE;
-    (F::ONE + rise * fl) * (F::ONE + rise * fv)
+fn both_ways<F: Real>(f90: F, [l, v]: [Edge<F>; 2]) -> F {
+    (l.rest + f90 * l.weight) * (v.rest + f90 * v.weight)
 }

@@ -8,6 +8,31 @@ pub fn schlick_weight<F: Real>(cos_theta: F) -> F {
     (F::ONE - cos_theta).clamp(F::ZERO, F::ONE).pow5()
 }
 
+/// Schlick's weight and what is left of 1, each to full precision.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge<F> {
+    /// (1 - cos θ)⁵.
+    pub(super) weight: F,
+    /// 1 - (1 - cos θ)⁵.
+    pub(super) rest: F,
+}
+
+impl<F: Real> Edge<F> {
+    /// At an angle of this cosine.
+    #[inline]
+    pub(super) fn at(cos_theta: F) -> Self {
+        Self::given_both(cos_theta, (F::ONE - cos_theta).clamp(F::ZERO, F::ONE))
+    }
+
+    /// The same where `q` = 1 - cos θ in [0, 1] is known more precisely.
+    #[inline]
+    pub(super) fn given_both(cos_theta: F, q: F) -> Self {
+        // 1 - q⁵ = (1 - q)(1 + q + q² + q³ + q⁴).
+        let rest = cos_theta * (F::ONE + q * (F::ONE + q * (F::ONE + q * (F::ONE + q))));
+        Self { weight: q.pow5(), rest }
+    }
+}
+
 /// How a smooth dielectric splits light that meets it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DielectricSplit<F> {
@@ -27,8 +52,13 @@ impl<F: Real> DielectricSplit<F> {
 /// The split at an interface whose far side has `eta` > 0 times the near side's refractive index, by Fresnel's equations.
 #[inline]
 pub(super) fn dielectric_split<F: Real>(cos_i: F, eta: F) -> DielectricSplit<F> {
-    // eta² cos² θt = eta² - sin² θi, without the cancellation near eta = 1 and at grazing angles.
-    let scaled_cos2_t = (eta - F::ONE) * (eta + F::ONE) + cos_i.sqr();
+    // eta² cos² θt = eta² - sin² θi, whichever of two forms cancels only where all light comes to be reflected: not near eta = 1 and at
+    // grazing angles, nor near eta = 0 head-on.
+    let scaled_cos2_t = if cos_i.sqr() > F::of(0.5) {
+        eta.sqr() - (F::ONE - cos_i) * (F::ONE + cos_i)
+    } else {
+        (eta - F::ONE) * (eta + F::ONE) + cos_i.sqr()
+    };
     if scaled_cos2_t <= F::ZERO {
         return DielectricSplit { reflectance: F::ONE, transmittance: F::ZERO, cos_t: F::ZERO };
     }
@@ -39,8 +69,11 @@ pub(super) fn dielectric_split<F: Real>(cos_i: F, eta: F) -> DielectricSplit<F> 
 #[inline]
 pub(super) fn split_given_both_cosines<F: Real>(cos_i: F, cos_t: F, eta: F) -> DielectricSplit<F> {
     let (parallel, perpendicular) = (eta * cos_i + cos_t, cos_i + eta * cos_t);
-    let r_parallel = (eta * cos_i - cos_t) / parallel;
-    let r_perpendicular = (cos_i - eta * cos_t) / perpendicular;
+    // With s = eta·cos θt, s² = eta² - 1 + cos² θi, the numerators cos θi - s and eta²·cos θi - s have the factor eta² - 1: no
+    // cancellation near eta = 1.
+    let eta2_minus_1 = (eta - F::ONE) * (eta + F::ONE);
+    let r_perpendicular = eta2_minus_1 / perpendicular.sqr();
+    let r_parallel = eta2_minus_1 * (cos_i * perpendicular - F::ONE) / (perpendicular * eta * parallel);
     let reflectance = F::of(0.5) * (r_parallel.sqr() + r_perpendicular.sqr());
     // 1 - ((a - b)/(a + b))² = 4ab/(a + b)².
     let product = F::of(2.0) * eta * cos_i * cos_t;

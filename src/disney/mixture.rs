@@ -1,12 +1,13 @@
-//! The whole Disney model: the lobes together, and how often each is sampled.
+//! The whole Disney model: the lobes together.
 
 use super::bsdf::{BsdfSample, Lobe, scattered};
 use super::clearcoat::Clearcoat;
 use super::dielectric::{delta, refracted};
 use super::diffuse::Diffuse;
-use super::fresnel::{DielectricSplit, dielectric_split, schlick_weight};
+use super::fresnel::{DielectricSplit, Edge, dielectric_split};
 use super::pair::Pair;
 use super::parameter::{DiffuseModel, Masking, Params};
+use super::probabilities::{Choice, Probabilities};
 use super::sheen::Sheen;
 use super::specular::{Schlick, Specular};
 use super::transmission::{DiffuseTransmission, Passage, Refraction, Transmission};
@@ -18,78 +19,13 @@ use crate::math::{Real, V3};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mixture<F> {
     pub(super) base_color: Rgb<F>,
-    diffuse: Option<Diffuse<F>>,
-    sheen: Option<Sheen<F>>,
-    specular: Specular<F>,
-    clearcoat: Option<Clearcoat<F>>,
-    transmission: Option<Transmission<F>>,
-    diffuse_transmission: Option<DiffuseTransmission<F>>,
-    thin_walled: bool,
-}
-
-/// How often each sampler is chosen; they sum to 1, or are all 0 where nothing is scattered.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Probabilities<F> {
-    /// Diffuse and sheen, by the cosine.
-    cosine: F,
-    /// Diffuse, uniform over the hemisphere.
-    uniform: F,
-    clearcoat: F,
-    /// Specular; with a rough interface, both what its facets reflect and what they refract.
-    specular: F,
-    /// Transmission that has a sampler of its own.
-    transmission: F,
-    diffuse_transmission: F,
-}
-
-/// The sampler that makes a direction.
-#[derive(Clone, Copy, Debug)]
-enum Choice {
-    Cosine,
-    Uniform,
-    Clearcoat,
-    Transmission,
-    DiffuseTransmission,
-    Specular,
-}
-
-impl<F: Real> Probabilities<F> {
-    fn normalized(self) -> Self {
-        let all = self.cosine + self.uniform + self.specular + self.clearcoat;
-        let sum = all + (self.transmission + self.diffuse_transmission);
-        if sum <= F::ZERO {
-            return Self::default();
-        }
-        let scale = F::ONE / sum;
-        Self {
-            cosine: self.cosine * scale,
-            uniform: self.uniform * scale,
-            clearcoat: self.clearcoat * scale,
-            specular: self.specular * scale,
-            transmission: self.transmission * scale,
-            diffuse_transmission: self.diffuse_transmission * scale,
-        }
-    }
-
-    /// The sampler that `u` in [0, 1) stands for, and what is left of `u` as a number in [0, 1) for a choice within it.
-    #[inline]
-    fn choose(&self, u: F) -> (Choice, F) {
-        let mut rest = u;
-        for (choice, chance) in [
-            (Choice::Cosine, self.cosine),
-            (Choice::Uniform, self.uniform),
-            (Choice::Clearcoat, self.clearcoat),
-            (Choice::Transmission, self.transmission),
-            (Choice::DiffuseTransmission, self.diffuse_transmission),
-        ] {
-            let beyond = rest - chance;
-            if beyond < F::ZERO {
-                return (choice, rest / chance);
-            }
-            rest = beyond;
-        }
-        (Choice::Specular, rest / self.specular)
-    }
+    pub(super) diffuse: Option<Diffuse<F>>,
+    pub(super) sheen: Option<Sheen<F>>,
+    pub(super) specular: Specular<F>,
+    pub(super) clearcoat: Option<Clearcoat<F>>,
+    pub(super) transmission: Option<Transmission<F>>,
+    pub(super) diffuse_transmission: Option<DiffuseTransmission<F>>,
+    pub(super) thin_walled: bool,
 }
 
 impl<F: Real> Mixture<F> {
@@ -97,7 +33,7 @@ impl<F: Real> Mixture<F> {
         let tint = tint(params.base_color);
         Self {
             base_color: params.base_color,
-            diffuse: Diffuse::new(params, Schlick::of_base(params, tint), diffuse),
+            diffuse: Diffuse::new(params, Schlick::complement(params, tint), diffuse),
             sheen: Sheen::new(params, tint),
             specular: Specular::new(params, tint, masking),
             clearcoat: Clearcoat::new(params),
@@ -105,64 +41,6 @@ impl<F: Real> Mixture<F> {
             diffuse_transmission: DiffuseTransmission::new(params),
             thin_walled: params.thin_walled,
         }
-    }
-
-    /// Proportional to an estimate of what each lobe scatters towards `wo`: the mean over channels of its albedo. The only source of
-    /// lobe probabilities. In front, a lobe that is there never has probability 0.
-    #[inline]
-    fn probabilities(&self, wo: V3<F>) -> Probabilities<F> {
-        if wo.z < F::ZERO {
-            return self.probabilities_inside(wo);
-        }
-        let (mut cosine, uniform) = self.diffuse.as_ref().map_or((F::ZERO, F::ZERO), |d| d.albedos(wo));
-        if let Some(sheen) = &self.sheen {
-            cosine += sheen.albedo(wo);
-        }
-        let clearcoat = self.clearcoat.as_ref().map_or(F::ZERO, |coat| coat.albedo(wo));
-        let mut transmission = F::ZERO;
-        let mut split = DielectricSplit::OPAQUE;
-        let mut refracted = F::ZERO;
-        if let Some(through) = &self.transmission {
-            split = dielectric_split(wo.z, through.ior);
-            match through.passage {
-                Passage::Rough => refracted = through.mean * split.transmittance,
-                Passage::Smooth => {
-                    transmission = through.mean * split.transmittance * self.specular.unmasked(wo).sqr();
-                }
-                Passage::ThinSmooth => transmission = through.mean * split.transmittance,
-                Passage::ThinRough(..) => {
-                    let typical = dielectric_split(through.typical_cosine(wo), through.ior);
-                    transmission = through.mean * typical.transmittance;
-                }
-            }
-        }
-        let specular = self.specular.albedo(wo, &split) + refracted;
-        let diffuse_transmission = self.diffuse_transmission.as_ref().map_or(F::ZERO, |d| d.albedo);
-        Probabilities { cosine, uniform, clearcoat, specular, transmission, diffuse_transmission }
-            .normalized()
-    }
-
-    /// From inside there is nothing but the dielectric and diffuse transmission.
-    fn probabilities_inside(&self, wo: V3<F>) -> Probabilities<F> {
-        let mut chance = Probabilities::default();
-        if let Some(through) = &self.transmission {
-            let split = dielectric_split(wo.z.abs(), through.eta(wo));
-            let reflected = self.specular.interface * split.reflectance;
-            match through.passage {
-                Passage::Rough => chance.specular = reflected + through.mean * split.transmittance,
-                Passage::Smooth => {
-                    // Beside a smooth passage the reflection may still be rough, where the indices match: never 0 then.
-                    chance.specular =
-                        if self.specular.is_delta { reflected } else { reflected + F::of(1e-6) };
-                    chance.transmission = through.mean * split.transmittance;
-                }
-                Passage::ThinRough(..) | Passage::ThinSmooth => {}
-            }
-        }
-        if let Some(diffuse) = self.diffuse_transmission.as_ref().filter(|_| !self.thin_walled) {
-            chance.diffuse_transmission = diffuse.albedo;
-        }
-        chance.normalized()
     }
 
     /// The BSDF without its delta lobes, and the density of [`Self::sample`] per unit solid angle.
@@ -211,10 +89,10 @@ impl<F: Real> Mixture<F> {
         }
         let (shape, pdf) = self.specular.shape_with_pdf(pair);
         match &self.transmission {
-            None => (self.specular.fresnel(pair.schlick, &DielectricSplit::OPAQUE) * shape, chance * pdf),
+            None => (self.specular.fresnel(pair.edge, &DielectricSplit::OPAQUE) * shape, chance * pdf),
             Some(through) => {
                 let split = dielectric_split(pair.cos_d, through.ior);
-                let fresnel = self.specular.fresnel(pair.schlick, &split);
+                let fresnel = self.specular.fresnel(pair.edge, &split);
                 let [reflected, _] = through.shares(fresnel.mean(), &split);
                 (fresnel * shape, chance * pdf * reflected)
             }
@@ -280,7 +158,7 @@ impl<F: Real> Mixture<F> {
     #[inline]
     fn reflected_by_facet(&self, cos_o: F, side: Side, split: &DielectricSplit<F>) -> F {
         match side {
-            Side::Outside => self.specular.fresnel(schlick_weight(cos_o), split).mean(),
+            Side::Outside => self.specular.fresnel(Edge::at(cos_o), split).mean(),
             Side::Inside => self.specular.interface * split.reflectance,
         }
     }
@@ -368,10 +246,18 @@ impl<F: Real> Mixture<F> {
         let eta = through.eta(wo);
         let split = dielectric_split(wo.z.abs(), eta);
         let wi = refracted(wo, split.cos_t, eta);
-        let above = |w: V3<F>| V3::new(w.x, w.y, w.z.abs());
-        let unmasked = self.specular.unmasked(above(wo)) * self.specular.unmasked(above(wi));
+        let unmasked = self.unmasked_passage(wo, &split);
         let factor = through.tint * (split.transmittance / eta.sqr() * unmasked);
         delta(wi, factor, chance, Lobe::DielectricTransmission, eta)
+    }
+
+    /// The part of a smooth interface that G lets be seen from both ends of a path through it.
+    #[inline]
+    pub(super) fn unmasked_passage(&self, wo: V3<F>, split: &DielectricSplit<F>) -> F {
+        let above = |w: V3<F>| V3::new(w.x, w.y, w.z.abs());
+        let eta = self.transmission.as_ref().map_or(F::ONE, |through| through.eta(wo));
+        let wi = refracted(wo, split.cos_t, eta);
+        self.specular.unmasked(above(wo)) * self.specular.unmasked(above(wi))
     }
 
     /// What a clear sheet lets pass straight, none where light is bent, spread or blocked.
@@ -469,6 +355,9 @@ impl Side {
 
 /// The base colour's hue: the colour over its approximate luminance 0.3 R + 0.6 G + 0.1 B, white for black (disney.brdf).
 fn tint<F: Real>(color: Rgb<F>) -> Rgb<F> {
+    // A luminance that is denormal has lost bits, or all of them. The factor is a power of two.
+    let dim = color.max_channel() < F::of(1e-30);
+    let color = if dim { color * F::of((1u64 << 60) as f64) } else { color };
     let luminance = F::of(0.3) * color.r + F::of(0.6) * color.g + F::of(0.1) * color.b;
     if luminance > F::ZERO { color / luminance } else { Rgb::WHITE }
 }

@@ -1,10 +1,12 @@
 //! The Disney BSDF: parameters with checked ranges, microfacet terms, lobes, `eval`, `sample` and `pdf`.
 //!
 //! [`Bsdf`] is what the integrator sees. Behind it each lobe has a file of its own, with its value, its sampler and the density
-//! of that sampler side by side; `mixture` is the one place that says how often each lobe is sampled.
+//! of that sampler side by side; `probabilities` is the one place that says how often each lobe is sampled, and `bound` how large the
+//! weights of samples get by that.
 //!
 //! Everything is generic over [`crate::math::Real`], so that the `f64` twin the tests measure against is the same source.
 
+mod bound;
 mod bsdf;
 mod clearcoat;
 mod dielectric;
@@ -14,8 +16,10 @@ mod microfacet;
 mod mixture;
 mod pair;
 mod parameter;
+mod probabilities;
 mod sheen;
 mod specular;
+pub mod stress;
 #[cfg(test)]
 mod tests;
 mod transmission;

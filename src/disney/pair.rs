@@ -1,11 +1,12 @@
 //! What the lobes need to know of a pair of directions, computed once.
 
+use super::fresnel::Edge;
 use crate::math::{Real, V3};
 
 /// Two directions above the surface with the terms all lobes share.
 ///
-/// Terms are symmetric in the two directions as far as both have unit length: in `f32` reciprocity holds to about
-/// 10⁻⁶/|wo + wi|².
+/// All terms but Schlick's weight are symmetric in the two directions to the last bit. The weight is as far as both have unit length: in
+/// `f32` reciprocity holds to 10⁻⁶/|wo + wi|².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pair<F> {
     /// To the viewer.
@@ -20,8 +21,8 @@ pub(super) struct Pair<F> {
     pub(super) cos_d: F,
     /// cos² θd.
     pub(super) cos2_d: F,
-    /// Schlick's weight (1 - cos θd)⁵.
-    pub(super) schlick: F,
+    /// Schlick's weight at θd.
+    pub(super) edge: Edge<F>,
 }
 
 impl<F: Real> Pair<F> {
@@ -36,14 +37,25 @@ impl<F: Real> Pair<F> {
         if !(above && has_half_vector) {
             return None;
         }
-        // Not |wo + wi|/2, which is the same for exact unit vectors alone.
-        let cos_d = wi.dot(sum) / sum2.sqrt();
-        let one_minus_cos_d = if cos_d > F::of(0.5) {
+        // The mean of the two directions' cosines with the half vector. They differ where rounding left the lengths unequal, and one of
+        // them is negative then if the directions are nearly opposite.
+        let cos_d = F::of(0.5) * sum2.sqrt();
+        // Schlick's weight is that of the light's own cosine, as in disney.brdf: dot(L, H).
+        let cos_i = (wi.dot(sum) / sum2.sqrt()).max(F::ZERO);
+        let one_minus_cos_i = if cos_i > F::of(0.5) {
             // = sin² θd/(1 + cos θd) with sin θd = |wo - wi|/2: no cancellation near θd = 0.
-            F::of(0.25) * (wo - wi).length_squared() / (F::ONE + cos_d)
+            F::of(0.25) * (wo - wi).length_squared() / (F::ONE + cos_i)
         } else {
-            F::ONE - cos_d.max(F::ZERO)
+            F::ONE - cos_i
         };
-        Some(Self { wo, wi, sum, sum2, cos_d, cos2_d: cos_d.sqr(), schlick: one_minus_cos_d.pow5() })
+        Some(Self {
+            wo,
+            wi,
+            sum,
+            sum2,
+            cos_d,
+            cos2_d: cos_d.sqr(),
+            edge: Edge::given_both(cos_i, one_minus_cos_i),
+        })
     }
 }

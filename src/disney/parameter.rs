@@ -295,6 +295,21 @@ impl<F: Real> Params<F> {
         (F::ONE - self.metallic) * (F::ONE - self.spec_trans)
     }
 
+    /// The same parameters in another float type.
+    pub fn cast<G: Real>(&self) -> Params<G> {
+        let mut cast = Params::<G> {
+            base_color: self.base_color.cast(),
+            thin_walled: self.thin_walled,
+            transmission_color: self.transmission_color.map(Rgb::cast),
+            diff_trans_color: self.diff_trans_color.map(Rgb::cast),
+            ..Params::default()
+        };
+        for p in Parameter::ALL {
+            *cast.get_mut(p) = G::of(self.get(p).to_f64());
+        }
+        cast
+    }
+
     /// The scalar of that name.
     pub fn get(&self, parameter: Parameter) -> F {
         match parameter {

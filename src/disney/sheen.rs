@@ -8,7 +8,7 @@ use crate::math::{Real, V3};
 /// The sheen term. It is broad, and sampled by the cosine together with the diffuse lobe.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sheen<F> {
-    color: Rgb<F>,
+    pub(super) color: Rgb<F>,
     mean: F,
 }
 
@@ -30,6 +30,6 @@ impl<F: Real> Sheen<F> {
     /// sheen·lerp(1, tint, sheen_tint)·(1 - metallic)·(1 - spec_trans)·(1 - cos θd)⁵, without a 1/π (Burley 2012, section 5.5, and disney.brdf).
     #[inline]
     pub(super) fn eval(&self, pair: &Pair<F>) -> Rgb<F> {
-        self.color * pair.schlick
+        self.color * pair.edge.weight
     }
 }

@@ -1,6 +1,7 @@
 //! The specular lobe: GTR2 with Schlick's Fresnel, blended with a dielectric's where the base is an interface.
 
-use super::fresnel::{DielectricSplit, schlick_weight};
+use super::bound::hue;
+use super::fresnel::{DielectricSplit, Edge};
 use super::microfacet::{Alpha, Gtr2, alpha_from_roughness, smith};
 use super::pair::Pair;
 use super::parameter::{Masking, Params};
@@ -41,26 +42,37 @@ pub(super) struct Schlick<F> {
 }
 
 impl<F: Real> Schlick<F> {
-    /// Of the base without an interface. `tint` is the base colour's hue.
-    pub(super) fn of_base(params: &Params<F>, tint: Rgb<F>) -> Self {
-        Self::weighted(params, tint, F::ZERO)
-    }
-
-    /// Less the share that the interface has of the dielectric part. Terms are ordered so that no rounding enters without one.
-    fn weighted(params: &Params<F>, tint: Rgb<F>, interface: F) -> Self {
-        let Params { metallic, f90, .. } = *params;
-        let dielectric = Rgb::WHITE.lerp(tint, params.specular_tint) * (F::of(0.08) * params.specular);
+    /// Less the share that the interface has of the dielectric part.
+    fn weighted(params: &Params<F>, tint: Rgb<F>) -> Self {
+        let Params { metallic, f90, base_color, .. } = *params;
+        let dielectric = params.diffuse_part();
         Self {
-            f0: dielectric * (F::ONE - metallic - interface).max(F::ZERO) + params.base_color * metallic,
-            f90: (f90 + (F::ONE - f90) * metallic - f90 * interface).max(F::ZERO),
+            f0: dielectric_f0(params, tint) * dielectric + base_color * metallic,
+            f90: f90 * dielectric + metallic,
         }
     }
+
+    /// 1 - F0, which may be negative, and 1 - F90 of the base without an interface: no cancellation where either nears 1.
+    pub(super) fn complement(params: &Params<F>, tint: Rgb<F>) -> Self {
+        let Params { metallic, f90, base_color, specular_tint, .. } = *params;
+        let grey = F::of(0.08) * params.specular;
+        let dielectric = Rgb::grey(F::ONE - grey) + (Rgb::WHITE - tint) * (grey * specular_tint);
+        Self {
+            f0: dielectric * (F::ONE - metallic) + (Rgb::WHITE - base_color) * metallic,
+            f90: (F::ONE - f90) * (F::ONE - metallic),
+        }
+    }
+}
+
+/// 0.08·specular·lerp(1, tint, specular_tint).
+fn dielectric_f0<F: Real>(params: &Params<F>, tint: Rgb<F>) -> Rgb<F> {
+    Rgb::WHITE.lerp(tint, params.specular_tint) * (F::of(0.08) * params.specular)
 }
 
 impl<F: Real> Specular<F> {
     pub(super) fn new(params: &Params<F>, tint: Rgb<F>, masking: Masking) -> Self {
         let interface = params.interface_part();
-        let Schlick { f0, f90 } = Schlick::weighted(params, tint, interface);
+        let Schlick { f0, f90 } = Schlick::weighted(params, tint);
         let is_delta = interface > F::ZERO && params.roughness == F::ZERO;
         let alpha = alpha_from_roughness(params.roughness, params.anisotropic);
         let masking_alpha = match masking {
@@ -108,22 +120,33 @@ impl<F: Real> Specular<F> {
             Masking::Remapped => {
                 // Both directions are masked more than D's own alpha says; the light's less so the wider the lobe.
                 let masked = smith(wo, self.masking_alpha) / smith(wo, self.alpha);
-                albedo * masked * masked.lerp(F::ONE, self.roughness)
+                albedo * masked * masked.lerp(F::ONE, self.roughness.max(F::of(0.05)))
             }
         }
     }
 
     /// The Fresnel term outside, lerp(Schlick, dielectric, spec_trans)·(1 - metallic) and the metal's part.
     #[inline]
-    pub(super) fn fresnel(&self, schlick_weight: F, split: &DielectricSplit<F>) -> Rgb<F> {
-        let schlick = self.f0 + (Rgb::grey(self.f90) - self.f0) * schlick_weight;
-        schlick + Rgb::grey(self.interface * split.reflectance)
+    pub(super) fn fresnel(&self, edge: Edge<F>, split: &DielectricSplit<F>) -> Rgb<F> {
+        self.f0 * edge.rest + Rgb::grey(self.f90 * edge.weight + self.interface * split.reflectance)
+    }
+
+    /// The largest channel and the mean that Schlick's part of the Fresnel term reaches for cosines from `least` to 1; see `bound`.
+    pub(super) fn fresnel_bounds(&self, least: F) -> (F, F) {
+        let at = |cos_d| self.fresnel(Edge::at(cos_d), &DielectricSplit::OPAQUE);
+        let (level, edge) = (at(F::ONE), at(least));
+        (level.max_channel().max(edge.max_channel()), level.mean().max(edge.mean()))
+    }
+
+    /// The largest channel of F0 over its mean: adding grey makes it less.
+    pub(super) fn f0_hue(&self) -> F {
+        hue(self.f0)
     }
 
     /// What a smooth surface reflects of the light from the mirror direction.
     #[inline]
     pub(super) fn mirrored(&self, wo: V3<F>, split: &DielectricSplit<F>) -> Rgb<F> {
-        self.fresnel(schlick_weight(wo.z), split) * self.unmasked(wo).sqr()
+        self.fresnel(Edge::at(wo.z), split) * self.unmasked(wo).sqr()
     }
 
     /// The part of a smooth surface that G lets be seen along `w` above it: all, but `remapped` never has alpha 0.

@@ -14,14 +14,14 @@ use crate::math::warp::uniform_sphere;
 use crate::math::{Real, V3};
 
 /// ∫ f·|cos| dω of a material's lobes that aren't deltas, by quadrature in `f64`.
-fn quadrature(material: &Twin, wo: V3<f32>, tolerance: f64) -> f64 {
+pub(super) fn quadrature(material: &Twin, wo: V3<f32>, tolerance: f64) -> f64 {
     let wo = wo.cast();
     let grid = Sphere::new(wo, material.ior);
     grid.total(tolerance, &|wi| material.double.eval(wo, wi).mean() * wi.z.abs())
 }
 
 /// The mean of `samples` values with its standard error.
-fn estimate(samples: u32, mut value: impl FnMut() -> f64) -> (f64, f64) {
+pub(super) fn estimate(samples: u32, mut value: impl FnMut() -> f64) -> (f64, f64) {
     let (mut sum, mut sum2) = (0.0, 0.0);
     for _ in 0..samples {
         let v = value();
@@ -123,7 +123,7 @@ fn lobe_probabilities_follow_the_albedos() {
                 Specular::new(&Params { roughness, specular: f0 / 0.08, ..white }, Rgb::WHITE, masking);
             let name = format!("specular {masking:?} {f0} {roughness}");
             let none = DielectricSplit::OPAQUE;
-            let value = |p: &Pair<f64>| lobe.fresnel(p.schlick, &none).r * lobe.shape_with_pdf(p).0;
+            let value = |p: &Pair<f64>| lobe.fresnel(p.edge, &none).r * lobe.shape_with_pdf(p).0;
             assert_estimate(&name, 1.5, 0.003, value, |wo| lobe.albedo(wo, &none));
         }
     }
@@ -132,8 +132,8 @@ fn lobe_probabilities_follow_the_albedos() {
     for model in [DiffuseModel::Burley, DiffuseModel::Lambert, DiffuseModel::LambertFresnel] {
         for (roughness, subsurface) in [(0.0, 0.0), (0.5, 0.5), (1.0, 0.0), (1.0, 1.0)] {
             let params = Params { roughness, subsurface, ..white };
-            let highlight = Schlick { f0: Rgb::grey(0.04), f90: 1.0 };
-            let lobe = Diffuse::new(&params, highlight, model).unwrap();
+            let left = Schlick { f0: Rgb::grey(0.96), f90: 0.0 };
+            let lobe = Diffuse::new(&params, left, model).unwrap();
             let estimate = |wo| {
                 let (cosine, uniform) = lobe.albedos(wo);
                 cosine + uniform

@@ -1,6 +1,7 @@
 //! Tests of the whole BSDF: consistency, distribution, energy, extremes. This file holds what they share.
 
 mod albedo;
+mod albedo_table;
 mod chi2;
 mod consistency;
 mod delta;
@@ -8,30 +9,13 @@ mod mercator;
 mod stress;
 mod transmission;
 
+use super::stress::Random;
 use super::{Bsdf, DiffuseModel, Masking, Parameter, Params};
 use crate::color::Rgb;
-use crate::math::{Real, V3, hash};
+use crate::math::{Real, V3};
 
-/// Numbers in [0, 1) from a seed and a running count.
-struct Random {
-    seed: u64,
-    count: u64,
-}
-
+/// What the tests draw; the stress suite draws more at the extremes.
 impl Random {
-    fn new(seed: u64) -> Self {
-        Self { seed, count: 0 }
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.count += 1;
-        hash::combine(self.seed, self.count)
-    }
-
-    fn unit(&mut self) -> f32 {
-        hash::unit_f32((self.bits() >> 32) as u32)
-    }
-
     fn square(&mut self) -> [f32; 2] {
         [self.unit(), self.unit()]
     }
@@ -45,7 +29,7 @@ impl Random {
         }
     }
 
-    fn params(&mut self) -> Params {
+    fn burley_params(&mut self) -> Params {
         let mut params = Params {
             base_color: Rgb::new(self.parameter(), self.parameter(), self.parameter()),
             ..Params::default()
@@ -58,7 +42,7 @@ impl Random {
 
     /// Parameters of a surface that may transmit.
     fn transmissive_params(&mut self) -> Params {
-        let mut params = self.params();
+        let mut params = self.burley_params();
         if self.bits().is_multiple_of(2) {
             params.metallic = 0.0;
         }
@@ -118,17 +102,7 @@ impl Random {
 }
 
 fn cast(params: &Params) -> Params<f64> {
-    let mut twin = Params::<f64> {
-        base_color: params.base_color.cast(),
-        thin_walled: params.thin_walled,
-        transmission_color: params.transmission_color.map(Rgb::cast),
-        diff_trans_color: params.diff_trans_color.map(Rgb::cast),
-        ..Params::default()
-    };
-    for p in Parameter::ALL {
-        *twin.get_mut(p) = f64::from(params.get(p));
-    }
-    twin
+    params.cast()
 }
 
 /// A material with its `f64` twin.
@@ -157,7 +131,7 @@ fn mixed_materials() -> Vec<Twin> {
     let mut random = Random::new(77);
     let masking = |m: bool| if m { Masking::Remapped } else { Masking::Matched };
     let at_random = (0..14).map(|i| {
-        let params = if i < 7 { random.params() } else { random.transmissive_params() };
+        let params = if i < 7 { random.burley_params() } else { random.transmissive_params() };
         Twin::disney(&format!("random {i} {params:?}"), &params, masking(i % 2 == 1), random.diffuse_model())
     });
     let at_random: Vec<Twin> = at_random.collect();

@@ -1,0 +1,153 @@
+//! How often each lobe of the mixture is sampled.
+
+use super::fresnel::{DielectricSplit, dielectric_split};
+use super::mixture::Mixture;
+use super::transmission::Passage;
+use crate::math::{Real, V3};
+
+/// How often each sampler is chosen: they sum to 1, or are all 0 where nothing is scattered; before that, the estimates they are
+/// proportional to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Probabilities<F> {
+    /// Diffuse and sheen, by the cosine.
+    pub(super) cosine: F,
+    /// Diffuse, uniform over the hemisphere.
+    pub(super) uniform: F,
+    pub(super) clearcoat: F,
+    /// Specular; with a rough interface, both what its facets reflect and what they refract.
+    pub(super) specular: F,
+    /// Transmission that has a sampler of its own.
+    pub(super) transmission: F,
+    pub(super) diffuse_transmission: F,
+}
+
+/// The sampler that makes a direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Choice {
+    Cosine,
+    Uniform,
+    Clearcoat,
+    Transmission,
+    DiffuseTransmission,
+    Specular,
+}
+
+impl<F: Real> Probabilities<F> {
+    /// The sum of all.
+    #[inline]
+    pub(super) fn sum(&self) -> F {
+        let all = self.cosine + self.uniform + self.specular + self.clearcoat;
+        all + (self.transmission + self.diffuse_transmission)
+    }
+
+    #[inline]
+    fn normalized(self) -> Self {
+        let sum = self.sum();
+        if sum <= F::ZERO {
+            return Self::default();
+        }
+        // The reciprocal of a denormal sum isn't finite.
+        let lift = if sum < F::of(1e-30) { F::of(1e30) } else { F::ONE };
+        let scale = F::ONE / (sum * lift);
+        let scaled = |estimate: F| estimate * lift * scale;
+        Self {
+            cosine: scaled(self.cosine),
+            uniform: scaled(self.uniform),
+            clearcoat: scaled(self.clearcoat),
+            specular: scaled(self.specular),
+            transmission: scaled(self.transmission),
+            diffuse_transmission: scaled(self.diffuse_transmission),
+        }
+    }
+
+    /// The sampler that `u` in [0, 1) stands for, and what is left of `u` as a number in [0, 1) for a choice within it.
+    #[inline]
+    pub(super) fn choose(&self, u: F) -> (Choice, F) {
+        let mut rest = u;
+        for (choice, chance) in [
+            (Choice::Cosine, self.cosine),
+            (Choice::Uniform, self.uniform),
+            (Choice::Clearcoat, self.clearcoat),
+            (Choice::Transmission, self.transmission),
+            (Choice::DiffuseTransmission, self.diffuse_transmission),
+        ] {
+            let beyond = rest - chance;
+            if beyond < F::ZERO {
+                return (choice, rest / chance);
+            }
+            rest = beyond;
+        }
+        (Choice::Specular, rest / self.specular)
+    }
+}
+
+impl<F: Real> Mixture<F> {
+    /// Proportional to [`Self::estimates`].
+    #[inline]
+    pub(super) fn probabilities(&self, wo: V3<F>) -> Probabilities<F> {
+        self.estimates(wo).normalized()
+    }
+
+    /// What each lobe scatters towards `wo`, about: the mean over channels of its albedo. The only source of lobe probabilities. In
+    /// front, a lobe that is there never has 0.
+    #[inline]
+    pub(super) fn estimates(&self, wo: V3<F>) -> Probabilities<F> {
+        if wo.z < F::ZERO {
+            return self.estimates_inside(wo);
+        }
+        let (mut cosine, uniform) = self.diffuse.as_ref().map_or((F::ZERO, F::ZERO), |d| d.albedos(wo));
+        if let Some(sheen) = &self.sheen {
+            cosine += sheen.albedo(wo);
+        }
+        let clearcoat = self.clearcoat.as_ref().map_or(F::ZERO, |coat| coat.albedo(wo));
+        let mut transmission = F::ZERO;
+        let mut split = DielectricSplit::OPAQUE;
+        let mut refracted = F::ZERO;
+        if let Some(through) = &self.transmission {
+            split = dielectric_split(wo.z, through.ior);
+            match through.passage {
+                Passage::Rough => refracted = through.mean * split.transmittance,
+                Passage::Smooth => {
+                    transmission = through.mean * split.transmittance * self.unmasked_passage(wo, &split);
+                }
+                Passage::ThinSmooth => transmission = through.mean * split.transmittance,
+                Passage::ThinRough(..) => {
+                    let typical = dielectric_split(through.typical_cosine(wo), through.ior);
+                    // Some facets lean to the viewer and transmit even where all of the sheet would reflect.
+                    transmission = through.mean * typical.transmittance.max(F::of(0.02));
+                }
+            }
+        }
+        let specular = self.specular.albedo(wo, &split) + refracted;
+        let diffuse_transmission = self.diffuse_transmission.as_ref().map_or(F::ZERO, |d| d.albedo);
+        Probabilities { cosine, uniform, clearcoat, specular, transmission, diffuse_transmission }
+    }
+
+    /// From inside there is nothing but the dielectric and diffuse transmission.
+    fn estimates_inside(&self, wo: V3<F>) -> Probabilities<F> {
+        let mut estimate = Probabilities::default();
+        if let Some(through) = &self.transmission {
+            let split = dielectric_split(wo.z.abs(), through.eta(wo));
+            let reflected = self.specular.interface * split.reflectance;
+            match through.passage {
+                Passage::Rough => estimate.specular = reflected + through.mean * split.transmittance,
+                Passage::Smooth => {
+                    // Beside a smooth passage the reflection may still be rough, where the indices match: never 0 then.
+                    let unmasked = self.specular.unmasked(wo.mirrored_z()).sqr();
+                    estimate.specular = if self.specular.is_delta {
+                        reflected * unmasked
+                    } else {
+                        reflected + self.specular.interface * F::of(1e-6)
+                    };
+                    estimate.transmission =
+                        through.mean * split.transmittance * self.unmasked_passage(wo, &split);
+                }
+                Passage::ThinRough(..) | Passage::ThinSmooth => {}
+            }
+        }
+        if let Some(diffuse) = self.diffuse_transmission.as_ref().filter(|_| !self.thin_walled) {
+            estimate.diffuse_transmission = diffuse.albedo;
+        }
+        estimate
+    }
+}
