@@ -31,8 +31,8 @@
 //! | 8 | [`cli`] |
 //! | 7 | [`check`], [`inspect`] |
 //! | 6 | [`sweep`] |
-//! | 5 | [`job`], [`report`] |
-//! | 4 | [`render`], [`compare`], [`output`] |
+//! | 5 | [`job`], [`report`], [`export`] |
+//! | 4 | [`render`], [`compare`], [`output`], [`library`] |
 //! | 3 | [`import`], [`convert`], [`manifest`], [`accel`], [`light`] |
 //! | 2 | [`record`], [`scene`], [`imagefile`] |
 //! | 1 | [`disney`], [`raster`], [`settings`] |
@@ -48,10 +48,12 @@ pub mod color;
 pub mod compare;
 pub mod convert;
 pub mod disney;
+pub mod export;
 pub mod imagefile;
 pub mod import;
 pub mod inspect;
 pub mod job;
+pub mod library;
 pub mod light;
 pub mod manifest;
 pub mod math;

@@ -6,16 +6,19 @@ use std::path::{Path, PathBuf};
 
 /// Every module of the crate with its floor, in tenths: a module uses only floors below its own. `color` lies on the ground floor
 /// but above `math`, whose float type it is generic over; `settings` are part of a record.
-const FLOORS: [(&str, u32); 25] = [
+const FLOORS: [(&str, u32); 28] = [
     ("cli", 80),
     ("check", 70),
     ("inspect", 70),
     ("sweep", 60),
     ("job", 50),
     ("report", 50),
+    ("export", 50),
     ("render", 40),
     ("compare", 40),
     ("output", 40),
+    ("library", 40),
+    ("named", 0),
     ("import", 30),
     ("convert", 30),
     ("manifest", 30),

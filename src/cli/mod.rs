@@ -3,6 +3,7 @@
 
 mod accept;
 mod completions;
+mod convert;
 mod diff;
 mod inspect;
 mod progress;
@@ -53,6 +54,7 @@ struct Arguments {
 enum Command {
     Render(render::Arguments),
     Sweep(sweep::Arguments),
+    Convert(convert::Arguments),
     Accept(accept::Arguments),
     Diff(diff::Arguments),
     Inspect(inspect::Arguments),
@@ -90,6 +92,7 @@ fn run(arguments: &Arguments) -> Outcome {
     match &arguments.command {
         Command::Render(command) => render::run(command, talk),
         Command::Sweep(command) => sweep::run(command, talk),
+        Command::Convert(command) => convert::run(command, talk),
         Command::Accept(command) => accept::run(command, talk),
         Command::Diff(command) => diff::run(command, talk),
         Command::Inspect(command) => inspect::run(command, talk),

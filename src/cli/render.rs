@@ -23,7 +23,7 @@ use crate::settings::{Display, Filter, RenderSettings, ToneCurve};
 /// output's name ends so.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline render scenes/shaderball.glb -o ball.png --spp 256 --set material.ball.roughness=0.1\n  pipeline render model.obj -o model.exr --width 800 --set environment.rotation=90\n  pipeline render scenes/shaderball.glb --pixel 320,240 --sample 3"
+    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline render scenes/shaderball.glb -o ball.png --spp 256 --set material.ball.roughness=0.1\n  pipeline render model.obj -o model.exr --width 800 --set environment.rotation=90\n  pipeline render model.glb -o model.exr --materials edited.yaml\n  pipeline render scenes/shaderball.glb --pixel 320,240 --sample 3"
 )]
 pub(super) struct Arguments {
     /// The scene.
@@ -61,6 +61,9 @@ pub(super) struct Arguments {
     /// The diffuse term of Disney materials: burley, lambert or lambert_fresnel.
     #[arg(long, value_name = "MODEL", value_parser = parse_enum::<DiffuseModel>)]
     diffuse: Option<DiffuseModel>,
+    /// A material library to lay over the scene's materials, such as `pipeline convert` writes.
+    #[arg(long, value_name = "FILE")]
+    materials: Option<PathBuf>,
     /// Read glTF's punctual lights as Blender does: divided by 683.
     #[arg(long)]
     blender_lights: bool,
@@ -121,8 +124,10 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let import_options = ImportOptions {
         light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
     };
+    let convert_options = ConvertOptions { diffuse: arguments.diffuse };
+    let materials = arguments.materials.as_deref();
     let loaded =
-        job::load(&arguments.scene, &import_options, &ConvertOptions { diffuse: arguments.diffuse })?;
+        job::load(&arguments.scene, &import_options, &convert_options, materials).map_err(with_hint)?;
     let build = Build::current()?;
     let planned = job::plan(&described(arguments), &loaded, &build).map_err(with_hint)?;
     for warning in loaded.warnings.iter().chain(&planned.warnings) {

@@ -56,6 +56,8 @@ pub enum Quality {
     Dropped,
 }
 
+named_variants! { Quality { Exact "exact", Carried "carried", Approximated "approximated", Dropped "dropped", } }
+
 /// `scene` with its materials as Disney materials, and what became of each of their fields. It can't fail: importers have seen to
 /// the ranges.
 pub fn to_disney(scene: Scene<SourceMaterial>, options: &ConvertOptions) -> Converted {

@@ -25,7 +25,7 @@ use std::path::Path;
 pub use error::ImageFileError;
 pub use exr_write::{EncodedExr, encode_exr, write_exr};
 pub use picture::{encode_png, write_png};
-pub use texture::{Decoded, Samples, decode_texture};
+pub use texture::{Decoded, Interleaved, Samples, decode_texture, encode_texture};
 pub use whole::{remove_leftovers, write_whole};
 
 use crate::raster::Raster;

@@ -171,10 +171,32 @@ pub fn encode_png(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, ImageF
             "it has {has} bytes; {width} × {height} pixels need {expected}, at least 3"
         )));
     }
+    encode_interleaved(width, height, 3, 8, rgb)
+}
+
+/// Encodes integers of 8 or 16 bits, the latter in this machine's byte order, interleaved and row-major, as PNG. There are as many as they
+/// should be.
+pub(super) fn encode_interleaved(
+    width: u32,
+    height: u32,
+    channels: u8,
+    bits: u8,
+    values: &[u8],
+) -> Result<Vec<u8>, ImageFileError> {
+    let color = match (channels, bits) {
+        (1, 8) => ExtendedColorType::L8,
+        (2, 8) => ExtendedColorType::La8,
+        (3, 8) => ExtendedColorType::Rgb8,
+        (_, 8) => ExtendedColorType::Rgba8,
+        (1, _) => ExtendedColorType::L16,
+        (2, _) => ExtendedColorType::La16,
+        (3, _) => ExtendedColorType::Rgb16,
+        (_, _) => ExtendedColorType::Rgba16,
+    };
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
-        .write_image(rgb, width, height, ExtendedColorType::Rgb8)
-        .map_err(|error| refuse(error.to_string()))?;
+        .write_image(values, width, height, color)
+        .map_err(|error| ImageFileError::Encode { element: "the PNG".into(), why: error.to_string() })?;
     Ok(bytes)
 }
 

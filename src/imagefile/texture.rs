@@ -1,8 +1,8 @@
 //! An image as a texture wants it: interleaved, 8 and 16-bit data as they are, floats finite and not negative.
 
-use crate::raster::{Layer, Raster};
+use crate::raster::{Layer, Raster, Window};
 
-use super::{Format, ImageFileError, MAX_VALUES, exr_read, picture};
+use super::{Format, ImageFileError, MAX_VALUES, exr_read, exr_write, picture};
 
 /// A decoded picture: pixels row-major from the top left, channels interleaved, alpha unassociated as far as the file's is.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +50,63 @@ pub fn decode_texture(bytes: &[u8], name: &str) -> Result<Decoded, ImageFileErro
         }
     }
     Ok(decoded)
+}
+
+/// Pixels of a texture to be written.
+#[derive(Clone, Copy, Debug)]
+pub enum Interleaved<'a> {
+    /// [0, 255] for [0, 1].
+    U8(&'a [u8]),
+    /// [0, 65535] for [0, 1].
+    U16(&'a [u16]),
+    /// Floats.
+    F32(&'a [f32]),
+}
+
+/// Encodes a texture so that [`decode_texture`] gives the same values back: integers as PNG, floats as EXR. `channels` is 1 (grey), 2 (grey,
+/// alpha), 3 or 4.
+///
+/// # Errors
+/// If the image is empty, or the number of values isn't width · height · channels.
+pub fn encode_texture(
+    width: u32,
+    height: u32,
+    channels: u8,
+    pixels: Interleaved<'_>,
+) -> Result<Vec<u8>, ImageFileError> {
+    let count = match pixels {
+        Interleaved::U8(values) => values.len(),
+        Interleaved::U16(values) => values.len(),
+        Interleaved::F32(values) => values.len(),
+    };
+    let expected = width as usize * height as usize * usize::from(channels);
+    if expected == 0 || count != expected || channels > 4 {
+        let why = format!("{count} values for {width} × {height} pixels of {channels} channels");
+        return Err(ImageFileError::Encode { element: "the texture".into(), why });
+    }
+    match pixels {
+        Interleaved::U8(values) => picture::encode_interleaved(width, height, channels, 8, values),
+        Interleaved::U16(values) => {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_ne_bytes()).collect();
+            picture::encode_interleaved(width, height, channels, 16, &bytes)
+        }
+        Interleaved::F32(values) => {
+            let names: &[&str] = match channels {
+                1 => &["Y"],
+                2 => &["Y", "A"],
+                3 => &["R", "G", "B"],
+                _ => &["R", "G", "B", "A"],
+            };
+            let plane = |c: usize| values.iter().skip(c).step_by(names.len()).copied().collect();
+            let layer = names
+                .iter()
+                .enumerate()
+                .fold(Layer::new("", Window::sized(width, height)), |layer, (c, name)| {
+                    layer.with(*name, plane(c))
+                });
+            Ok(exr_write::encode_exr(&Raster::single(layer))?.bytes)
+        }
+    }
 }
 
 fn from_raster(raster: &Raster, name: &str) -> Result<Decoded, ImageFileError> {

@@ -41,6 +41,15 @@ pub(super) fn decode_image(bytes: &[u8], name: &str) -> Result<(Image, Option<Wa
     Ok((Image { name: name.to_owned(), width, height, channels, pixels }, warning))
 }
 
+/// The image in the file that a scene or a library calls `name`, and a warning if values had to be replaced.
+///
+/// # Errors
+/// If it can't be read or decoded.
+pub fn read_image(files: &mut Files, name: &str) -> Result<(Image, Option<Warning>), EnvironmentError> {
+    let bytes = files.read(name)?;
+    Ok(decode_image(&bytes, name)?)
+}
+
 /// The environment image that a job names by its path, with its digest for the job's identity.
 ///
 /// # Errors
@@ -49,8 +58,7 @@ pub fn read_environment(path: &Path) -> Result<(Image, FileDigest, Option<Warnin
     let wrong = || EnvironmentError::Name { path: path.display().to_string() };
     let name = path.file_name().and_then(|n| n.to_str()).ok_or_else(wrong)?;
     let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
-    let bytes = files.read(name)?;
-    let (image, warning) = decode_image(&bytes, name)?;
+    let (image, warning) = read_image(&mut files, name)?;
     let digest = files.into_digests().pop().ok_or_else(wrong)?;
     Ok((image, digest, warning))
 }

@@ -21,7 +21,7 @@ pub use aris::ArisError;
 pub(crate) use aris::yaml;
 pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
-pub use images::{EnvironmentError, read_environment};
+pub use images::{EnvironmentError, read_environment, read_image};
 pub use obj::ObjError;
 pub use validate::InvalidScene;
 

@@ -3,11 +3,11 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::edit::set;
-use super::{Edit, InspectError, Subject, library};
+use super::{Edit, InspectError, Subject};
 use crate::convert::{ConvertOptions, to_disney};
 use crate::disney::{DiffuseModel, Masking, Model};
 use crate::import::{ImportOptions, import};
+use crate::library::{Library, set};
 use crate::manifest::nearest::nearest;
 use crate::record::{Value, Warning};
 use crate::scene::{Material, Named, Scene};
@@ -110,14 +110,13 @@ fn load(
     let file = &target.file;
     let is_yaml =
         file.extension().is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"));
-    let of_library = if is_yaml {
-        let bytes = std::fs::read(file).map_err(|cause| InspectError::File { path: file.clone(), cause })?;
-        library::read(&file.display().to_string(), &bytes)?
-    } else {
-        None
-    };
+    let of_library = if is_yaml { Library::read(file)? } else { None };
     let (scene, materials) = match of_library {
-        Some(materials) => (Scene::empty(), materials),
+        Some(library) => {
+            let scene = library.into_scene()?;
+            let materials = scene.materials.clone();
+            (scene, materials)
+        }
         None => {
             let imported = import(file, &ImportOptions::default())?;
             let converted = to_disney(imported.scene, &ConvertOptions::default());

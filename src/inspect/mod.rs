@@ -10,7 +10,6 @@ mod edit;
 mod energy;
 pub mod eval;
 mod gather;
-mod library;
 mod maps;
 pub mod measure;
 mod numbers;
@@ -31,7 +30,8 @@ pub use report::{Inspected, Options, look, write_report};
 pub use sphere::Picture;
 pub use subject::{ParameterRow, Subject};
 
-use crate::import::{ArisError, ImportError};
+use crate::import::ImportError;
+use crate::library::LibraryError;
 use crate::manifest::edit::EditError;
 
 /// Why materials can't be looked into.
@@ -46,25 +46,9 @@ pub enum InspectError {
     /// A field that doesn't exist or doesn't take the value.
     #[error("{0}")]
     Edit(EditError),
-    /// The same in a library.
-    #[error("{place}: {cause}")]
-    Library {
-        /// `file:line:column`.
-        place: String,
-        /// Why.
-        cause: EditError,
-    },
-    /// A YAML file that is neither a library nor a scene.
-    #[error("{place}: {why}")]
-    NoLibrary {
-        /// `file:line:column`.
-        place: String,
-        /// Why not.
-        why: String,
-    },
-    /// A file that isn't YAML.
+    /// A library that can't be used.
     #[error(transparent)]
-    Yaml(#[from] Box<ArisError>),
+    Library(#[from] LibraryError),
     /// A scene that can't be imported.
     #[error(transparent)]
     Import(#[from] ImportError),
@@ -118,7 +102,8 @@ impl InspectError {
     /// What may help, where there is something to say.
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Edit(cause) | Self::Library { cause, .. } => cause.hint(),
+            Self::Edit(cause) => cause.hint(),
+            Self::Library(cause) => cause.hint(),
             Self::UnknownMaterial { nearest, known, .. } => {
                 let meant = nearest.as_ref().map_or_else(String::new, |n| format!("did you mean `{n}`? "));
                 Some(format!("{meant}it has {}", crate::manifest::nearest::listed(known)))

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::JobError;
 use crate::convert::{ConvertOptions, Note, to_disney};
 use crate::import::{FileDigest, ImportOptions, import};
+use crate::library::Library;
 use crate::record::Warning;
 use crate::render::Geometry;
 use crate::scene::{Named, Scene, framing, studio};
@@ -29,20 +30,28 @@ pub struct LoadedScene {
     pub warnings: Vec<Warning>,
 }
 
-/// Imports and converts a scene. One without a camera is framed, one without light is lit by a studio, and a warning says so.
+/// Imports and converts a scene and lays the library `materials` over its materials. One without a camera is framed, one without light is lit by a studio, and a warning says so.
 ///
 /// # Errors
-/// If the scene can't be read, or has nothing to render.
+/// If the scene or the library can't be read, the library doesn't fit, or there is nothing to render.
 pub fn load(
     path: &Path,
     import_options: &ImportOptions,
     convert_options: &ConvertOptions,
+    materials: Option<&Path>,
 ) -> Result<LoadedScene, JobError> {
     let imported = import(path, import_options)?;
     let converted = to_disney(imported.scene, convert_options);
     let mut scene = converted.scene;
     let mut warnings = imported.warnings;
     warnings.extend(converted.warnings);
+    let mut files = imported.files;
+    if let Some(path) = materials {
+        let library = Library::read(path)?.ok_or_else(|| JobError::NoLibrary { path: path.into() })?;
+        let (read, noticed) = library.lay_over(&mut scene)?;
+        files.extend(read);
+        warnings.extend(noticed);
+    }
     let place = path.display().to_string();
     if scene.cameras.is_empty() {
         let camera = framing::frame(&scene);
@@ -65,7 +74,7 @@ pub fn load(
         geometry,
         import_options: import_options.clone(),
         convert_options: convert_options.clone(),
-        files: imported.files,
+        files,
         notes: converted.notes,
         warnings,
     })

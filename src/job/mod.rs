@@ -28,6 +28,15 @@ pub enum JobError {
     /// An override does not fit the scene.
     #[error(transparent)]
     Edit(#[from] crate::manifest::edit::EditError),
+    /// A material library does not fit the scene.
+    #[error(transparent)]
+    Library(#[from] crate::library::LibraryError),
+    /// A file that should be a material library is a scene.
+    #[error("{}: this is a scene, not a material library", path.display())]
+    NoLibrary {
+        /// The file.
+        path: PathBuf,
+    },
     /// An image could not be read or written.
     #[error(transparent)]
     ImageFile(#[from] crate::imagefile::ImageFileError),
@@ -57,6 +66,7 @@ impl JobError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Edit(error) => error.hint(),
+            Self::Library(error) => error.hint(),
             _ => None,
         }
     }

@@ -61,6 +61,9 @@ pub struct Manifest {
     /// Whether `scene` is a list or a pattern, and so an axis even if it comes to one file.
     #[schemars(skip)]
     pub scene_is_axis: bool,
+    /// A material library, relative to the manifest, to lay over the materials of every scene.
+    #[schemars(with = "Option<String>")]
+    pub materials: Option<PathBuf>,
     /// What is set in every job, by path, as in `"material.ball.metallic" = 1.0`.
     #[schemars(with = "Option<BTreeMap<String, SettingTree>>")]
     pub set: Vec<Setting>,

@@ -83,7 +83,7 @@ pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Res
     };
     let destination = Destination { folder, references };
 
-    let mut scenes = Scenes::default();
+    let mut scenes = Scenes::of(sweep);
     check_with(sweep, &mut scenes)?;
 
     let mut records: Vec<(usize, JobRecord)> = Vec::new();
@@ -121,7 +121,7 @@ pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Res
 /// # Errors
 /// If the manifest does not fit a scene that can be loaded.
 pub fn check(sweep: &Sweep) -> Result<Vec<String>, SweepError> {
-    check_with(sweep, &mut Scenes::default())
+    check_with(sweep, &mut Scenes::of(sweep))
 }
 
 fn check_with(sweep: &Sweep, scenes: &mut Scenes) -> Result<Vec<String>, SweepError> {
@@ -172,19 +172,27 @@ fn run_job(
 /// Loaded scenes: only the last one is kept, since jobs come scene by scene, but every failure.
 #[derive(Default)]
 struct Scenes {
+    /// The library that is laid over each.
+    materials: Option<PathBuf>,
     last: Option<(PathBuf, LoadedScene)>,
     failed: BTreeMap<PathBuf, String>,
 }
 
 impl Scenes {
+    fn of(sweep: &Sweep) -> Self {
+        let materials = sweep.manifest.materials.as_ref().map(|file| sweep.manifest.folder().join(file));
+        Self { materials, ..Self::default() }
+    }
+
     fn get(&mut self, path: &Path) -> Result<&LoadedScene, String> {
         if let Some(error) = self.failed.get(path) {
             return Err(error.clone());
         }
         if self.last.as_ref().is_none_or(|(last, _)| last != path) {
             self.last = None;
+            let materials = self.materials.as_deref();
             let load = |path| -> Result<LoadedScene, JobError> {
-                job::load(path, &ImportOptions::default(), &ConvertOptions::default())
+                job::load(path, &ImportOptions::default(), &ConvertOptions::default(), materials)
             };
             match load(path) {
                 Ok(loaded) => self.last = Some((path.to_owned(), loaded)),

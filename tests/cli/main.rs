@@ -4,6 +4,7 @@
 
 mod command_line;
 mod configs;
+mod convert;
 mod determinism;
 mod diff;
 mod failures;

@@ -13,6 +13,7 @@ pub(in crate::manifest) const MANIFEST: &[&str] = &[
     "environment",
     "light",
     "material",
+    "materials",
     "sheet",
     "compare",
     "output",

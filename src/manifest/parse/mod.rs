@@ -86,6 +86,7 @@ fn manifest(reader: &mut Reader, tree: &DeTable<'_>, source: Source) -> Manifest
         name: name.unwrap_or_else(|| plain_name(&stem(&source.path))),
         scenes,
         scene_is_axis,
+        materials: top.get("materials").and_then(|n| reader.text("materials", n)).map(|p| p.value.into()),
         set,
         exclude: exclude(reader, &top),
         max_jobs,

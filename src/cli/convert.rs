@@ -1,0 +1,103 @@
+//! `pipeline convert`.
+
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+
+use super::render::parse_enum;
+use super::{FAILED, Outcome, Talk, WELL, print, tell};
+use crate::convert::ConvertOptions;
+use crate::disney::DiffuseModel;
+use crate::export::{self, Exported, Input, export_library};
+use crate::import::ImportOptions;
+
+/// Convert scenes' materials into Disney material libraries, and tell what became of each field.
+///
+/// The library, materials.yaml, is for editing by hand: `pipeline render model.glb --materials materials.yaml` lays it over the scene, and
+/// unedited it gives the same picture. Textures are written beside it. A folder is converted with all scenes inside it, in parallel; a
+/// broken file does not stop the others.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  pipeline convert scenes/shaderball.glb -o outputs/shaderball_materials\n  pipeline convert model.glb --report html > report.html\n  pipeline convert assets/ -o libraries"
+)]
+pub(super) struct Arguments {
+    /// Scenes, or folders of scenes.
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    /// The folder to write into; outputs/convert/NAME where absent.
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// How to tell what became of the materials, on stdout.
+    #[arg(long, value_enum, default_value_t = Report::Table)]
+    report: Report,
+    /// The diffuse term of Disney materials: burley, lambert or lambert_fresnel.
+    #[arg(long, value_name = "MODEL", value_parser = parse_enum::<DiffuseModel>)]
+    diffuse: Option<DiffuseModel>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Report {
+    Table,
+    Json,
+    Html,
+}
+
+pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
+    let inputs = export::inputs(&arguments.scenes, &output(arguments))?;
+    let options = ConvertOptions { diffuse: arguments.diffuse };
+    let (exported, failed) = convert_all(&inputs, &options, talk);
+    for warning in exported.iter().flat_map(|e| &e.warnings) {
+        talk.say(&format!("warning: {warning}"));
+    }
+    print(&report(&exported, arguments.report)?)?;
+    for (source, error) in &failed {
+        let (text, file) = (error.to_string(), source.display().to_string());
+        let place = if text.contains(&file) { String::new() } else { format!("{file}: ") };
+        tell(&format!("error: {place}{text}"));
+    }
+    Ok(if failed.is_empty() { WELL } else { FAILED })
+}
+
+fn output(arguments: &Arguments) -> PathBuf {
+    arguments.output.clone().unwrap_or_else(|| {
+        let name = arguments.scenes.first().and_then(|s| s.file_stem()).unwrap_or_default();
+        Path::new("outputs/convert").join(name)
+    })
+}
+
+type Failures = Vec<(PathBuf, export::ExportError)>;
+
+/// Converts in parallel; results and failures in the order of the inputs.
+fn convert_all(inputs: &[Input], options: &ConvertOptions, talk: Talk) -> (Vec<Exported>, Failures) {
+    let bar = match (talk, inputs.len()) {
+        (Talk::Normal, 2..) => ProgressBar::new(inputs.len() as u64),
+        _ => ProgressBar::hidden(),
+    };
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} {wide_msg}") {
+        bar.set_style(style);
+    }
+    let results: Vec<_> = inputs
+        .par_iter()
+        .map(|input| {
+            bar.set_message(input.source.display().to_string());
+            let result = export_library(&input.source, &input.folder, &ImportOptions::default(), options);
+            bar.inc(1);
+            result.map_err(|error| (input.source.clone(), error))
+        })
+        .collect();
+    bar.finish_and_clear();
+    let mut failed = Vec::new();
+    let exported =
+        results.into_iter().filter_map(|r| r.map_err(|failure| failed.push(failure)).ok()).collect();
+    (exported, failed)
+}
+
+fn report(exported: &[Exported], report: Report) -> Result<String, Box<dyn std::error::Error>> {
+    let width = terminal_size::terminal_size().map(|(width, _)| width.0);
+    Ok(match report {
+        Report::Table => exported.iter().map(|e| export::table(e, width)).collect::<Vec<_>>().join("\n"),
+        Report::Json => format!("{:#}\n", export::json(exported)),
+        Report::Html => export::html(exported)?,
+    })
+}

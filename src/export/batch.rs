@@ -1,0 +1,100 @@
+//! Files and folders into scenes to convert, each with a folder of its own.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use walkdir::WalkDir;
+
+use super::ExportError;
+
+/// A scene to convert.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Input {
+    /// Its file.
+    pub source: PathBuf,
+    /// Where its library goes.
+    pub folder: PathBuf,
+}
+
+const ENDINGS: [&str; 5] = ["gltf", "glb", "obj", "yaml", "yml"];
+
+/// The scenes that `paths` name, files as they are and folders with all scenes inside them, in alphabetical order. Each has a folder under
+/// `output` after its path within the folder it was found in; a single file has `output` itself.
+///
+/// # Errors
+/// If a folder can't be looked into or has no scene.
+pub fn inputs(paths: &[PathBuf], output: &Path) -> Result<Vec<Input>, ExportError> {
+    if let [file] = paths
+        && !file.is_dir()
+    {
+        return Ok(vec![Input { source: file.clone(), folder: output.to_owned() }]);
+    }
+    let mut inputs = Vec::new();
+    let mut taken = BTreeSet::new();
+    for path in paths {
+        if path.is_dir() {
+            for source in scenes_in(path)? {
+                let inside = source.strip_prefix(path).unwrap_or(&source).to_owned();
+                inputs.push(Input { folder: own_folder(output, &inside, &mut taken), source });
+            }
+        } else {
+            let name = PathBuf::from(path.file_name().unwrap_or_default());
+            inputs.push(Input { folder: own_folder(output, &name, &mut taken), source: path.clone() });
+        }
+    }
+    Ok(inputs)
+}
+
+fn scenes_in(folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
+    let mut scenes = Vec::new();
+    for entry in WalkDir::new(folder).sort_by_file_name() {
+        let entry = entry.map_err(|error| ExportError::File {
+            path: error.path().unwrap_or(folder).to_owned(),
+            cause: error.into(),
+        })?;
+        if entry.file_type().is_file() && is_scene(entry.path()) {
+            scenes.push(entry.into_path());
+        }
+    }
+    if scenes.is_empty() { Err(ExportError::NoScene { path: folder.to_owned() }) } else { Ok(scenes) }
+}
+
+fn is_scene(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    name.rsplit_once('.').is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
+}
+
+/// A folder that nothing else has: two files may differ in their ending alone.
+fn own_folder(output: &Path, inside: &Path, taken: &mut BTreeSet<PathBuf>) -> PathBuf {
+    let stem = inside.with_extension("");
+    let mut folder = output.join(&stem);
+    if !taken.insert(folder.clone()) {
+        folder = output.join(inside);
+        taken.insert(folder.clone());
+    }
+    folder
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_are_walked_and_every_scene_has_a_folder_of_its_own() {
+        let root = tempfile::tempdir().unwrap();
+        for file in ["a.glb", "a.obj", "sub/b.GLTF", "c.obj.gz", "notes.txt", ".glb"] {
+            let path = root.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        let found = inputs(&[root.path().to_owned()], Path::new("out")).unwrap();
+        let folders: Vec<String> = found.iter().map(|i| i.folder.display().to_string()).collect();
+        assert_eq!(folders, ["out/a", "out/a.obj", "out/c.obj", "out/sub/b"]);
+        let single = inputs(&[root.path().join("a.glb")], Path::new("out")).unwrap();
+        assert_eq!(single[0].folder, Path::new("out"));
+        let empty = tempfile::tempdir().unwrap();
+        let error = inputs(&[empty.path().to_owned()], Path::new("out")).unwrap_err();
+        assert!(matches!(error, ExportError::NoScene { .. }));
+    }
+}

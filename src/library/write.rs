@@ -1,0 +1,261 @@
+//! A scene's materials as a library's text, with the images that it names.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use super::keys;
+use crate::color::Rgb;
+use crate::disney::{Model, Parameter};
+use crate::imagefile::{ImageFileError, Interleaved, encode_texture, write_whole};
+use crate::manifest::names::plain_name;
+use crate::scene::material::{Material, Param, TextureChannel, TextureMap};
+use crate::scene::texture::{Image, Pixels, TexelFilter, Wrap};
+use crate::scene::{ImageId, Scene};
+
+/// The folder beside the library that holds its textures.
+const TEXTURES: &str = "textures";
+
+/// A library's text and its textures.
+#[derive(Clone, Debug)]
+pub struct Written<'a> {
+    /// The YAML.
+    pub text: String,
+    /// The images that the text names, each with its path relative to the library.
+    pub textures: Vec<(String, &'a Image)>,
+}
+
+/// The materials of `scene` as a library; `source` is named in its first line.
+///
+/// Every material says all of its model's own parameters, and what else differs from the default. Numbers are the shortest that read
+/// back to the same bits.
+pub fn write<'a>(scene: &'a Scene<Material>, source: &str) -> Written<'a> {
+    let mut writer = Writer { scene, files: vec![None; scene.images.len()], text: String::new() };
+    writer.line(0, &format!("# Materials of {source}: change a number and render with --materials FILE."));
+    for material in &scene.materials {
+        writer.line(0, &format!("{}:", quoted(&material.name)));
+        writer.material(&material.item);
+    }
+    let named = writer.files.iter().zip(&scene.images);
+    let textures = named.filter_map(|(file, image)| Some((file.clone()?, &**image))).collect();
+    Written { text: writer.text, textures }
+}
+
+impl Written<'_> {
+    /// Writes the library and its textures into `folder`, the text last: where it stands, the textures do. Returns the library's file.
+    ///
+    /// # Errors
+    /// If a texture can't be encoded or a file not written.
+    pub fn save(&self, folder: &Path) -> Result<PathBuf, ImageFileError> {
+        for (file, image) in &self.textures {
+            let pixels = match &image.pixels {
+                Pixels::U8(values) => Interleaved::U8(values),
+                Pixels::U16(values) => Interleaved::U16(values),
+                Pixels::F32(values) => Interleaved::F32(values),
+            };
+            let bytes = encode_texture(image.width, image.height, image.channels, pixels)?;
+            write_whole(&folder.join(file), &bytes)?;
+        }
+        let path = folder.join(FILE_NAME);
+        write_whole(&path, self.text.as_bytes())?;
+        Ok(path)
+    }
+}
+
+/// What a library's file is called.
+pub const FILE_NAME: &str = "materials.yaml";
+
+struct Writer<'a> {
+    scene: &'a Scene<Material>,
+    /// The files of the images that are used, by image.
+    files: Vec<Option<String>>,
+    text: String,
+}
+
+impl Writer<'_> {
+    fn line(&mut self, depth: usize, text: &str) {
+        self.text.push_str(&"  ".repeat(depth));
+        self.text.push_str(text);
+        self.text.push('\n');
+    }
+
+    fn entry(&mut self, key: &str, value: &str) {
+        self.line(2, &format!("{key}: {value}"));
+    }
+
+    fn material(&mut self, m: &Material) {
+        let default = Material::default();
+        self.line(1, &format!("name: {}", m.model.name()));
+        self.line(1, "config:");
+        let start = self.text.len();
+        match m.model {
+            Model::Disney => {
+                self.color(keys::COLOR, &m.base_color);
+                for p in Parameter::ALL {
+                    let is_own = Parameter::BURLEY_2012.contains(&p);
+                    if is_own || m.scalar(p) != default.scalar(p) {
+                        self.scalar(keys::of(p), m.scalar(p));
+                    }
+                }
+                self.disney_choices(m, &default);
+            }
+            Model::Diffuse => self.color(keys::COLOR, &m.base_color),
+            Model::Mirror => {}
+            Model::Dielectric => {
+                self.entry(keys::EXT_IOR, "1");
+                self.scalar(keys::INT_IOR, m.scalar(Parameter::Ior));
+            }
+        }
+        self.around(m, &default);
+        if self.text.len() == start {
+            // An empty map: nothing but the model.
+            self.text.truncate(start - 1);
+            self.text.push_str(" {}\n");
+        }
+    }
+
+    /// What only the Disney model has, beyond its scalars.
+    fn disney_choices(&mut self, m: &Material, default: &Material) {
+        if let Some(color) = &m.transmission_color {
+            self.color("transmissionColor", color);
+        }
+        if let Some(color) = &m.diff_trans_color {
+            self.color("diffTransColor", color);
+        }
+        if m.thin_walled {
+            self.entry("thinWalled", "true");
+        }
+        if m.masking != default.masking {
+            self.entry("masking", m.masking.name());
+        }
+        if m.diffuse != default.diffuse {
+            self.entry("diffuse", m.diffuse.name());
+        }
+    }
+
+    /// What every model may have around its BSDF.
+    fn around(&mut self, m: &Material, default: &Material) {
+        if m.absorption != default.absorption {
+            self.entry("absorption", &rgb(m.absorption));
+        }
+        if m.emits() {
+            self.color("emissionColor", &m.emission.color);
+            self.entry("emissionStrength", &number(m.emission.strength));
+            self.entry(keys::EMISSION_SIDES, m.emission.sides.name());
+        }
+        if m.opacity != default.opacity {
+            self.scalar("opacity", &m.opacity.alpha);
+            if let Some(cutoff) = m.opacity.cutoff {
+                self.entry("cutoff", &number(cutoff));
+            }
+        }
+        if let Some(normal) = &m.normal_map {
+            let map = self.map(&normal.map, None, None);
+            self.entry(keys::NORMAL_MAP, &map);
+            self.entry("normalScale", &number(normal.scale));
+        }
+        if m.rotation != 0.0 {
+            // In f64, so that it comes back to the same bits.
+            self.entry("rotation", &f64::from(m.rotation).to_degrees().to_string());
+        }
+        if m.frame != default.frame {
+            self.entry(keys::FRAME, m.frame.name());
+        }
+        if m.sides != default.sides {
+            self.entry(keys::SIDES, m.sides.name());
+        }
+        for (key, is) in [(keys::VERTEX_COLOR, m.vertex_color), (keys::VERTEX_ALPHA, m.vertex_alpha)] {
+            if is {
+                self.entry(key, "true");
+            }
+        }
+    }
+
+    fn scalar(&mut self, key: &str, param: &Param<f32>) {
+        let text = match param {
+            Param::Constant(value) => number(*value),
+            Param::Texture { map, factor } => self.map(map, Some(map.channel), Some(number(*factor))),
+        };
+        self.entry(key, &text);
+    }
+
+    fn color(&mut self, key: &str, param: &Param<Rgb>) {
+        let text = match param {
+            Param::Constant(value) => rgb(*value),
+            Param::Texture { map, factor } => self.map(map, None, Some(rgb(*factor))),
+        };
+        self.entry(key, &text);
+    }
+
+    /// A texture as one parameter uses it, as a map on one line; what is as by default is left out.
+    fn map(&mut self, map: &TextureMap, channel: Option<TextureChannel>, factor: Option<String>) -> String {
+        let texture = &self.scene.textures[map.texture.0 as usize];
+        let mut text = format!("{{file: {}", quoted(&self.file(texture.image)));
+        let mut add = |key: &str, value: &str| {
+            let _ = write!(text, ", {key}: {value}");
+        };
+        if let Some(channel) = channel {
+            add(keys::CHANNEL, channel.name());
+        }
+        if let Some(factor) = factor {
+            add(keys::FACTOR, &factor);
+        }
+        add(keys::ENCODING, texture.encoding.name());
+        if map.uv_set != 0 {
+            add(keys::UV_SET, &map.uv_set.to_string());
+        }
+        if map.texture_from_uv != glam::Affine2::IDENTITY {
+            let columns = map.texture_from_uv.to_cols_array().map(number);
+            add(keys::TRANSFORM, &format!("[{}]", columns.join(", ")));
+        }
+        if texture.wrap != [Wrap::default(); 2] {
+            let [u, v] = texture.wrap.map(|w| w.name());
+            add(keys::WRAP, &format!("[{u}, {v}]"));
+        }
+        if texture.filter != TexelFilter::default() {
+            add(keys::FILTER, texture.filter.name());
+        }
+        text.push('}');
+        text
+    }
+
+    /// The file of an image, named after it.
+    fn file(&mut self, image: ImageId) -> String {
+        let index = image.0 as usize;
+        if let Some(file) = &self.files[index] {
+            return file.clone();
+        }
+        let image = &self.scene.images[index];
+        let stem =
+            std::path::Path::new(&image.name).file_stem().map_or("image".into(), |s| s.to_string_lossy());
+        let stem = plain_name(&stem);
+        let extension = if matches!(image.pixels, Pixels::F32(_)) { "exr" } else { "png" };
+        let mut file = format!("{TEXTURES}/{stem}.{extension}");
+        let mut again = 2;
+        while self.files.iter().flatten().any(|f| f.eq_ignore_ascii_case(&file)) {
+            file = format!("{TEXTURES}/{stem}-{again}.{extension}");
+            again += 1;
+        }
+        self.files[index] = Some(file.clone());
+        file
+    }
+}
+
+/// The shortest decimal that reads back to the same float.
+fn number(value: f32) -> String {
+    value.to_string()
+}
+
+fn rgb(c: Rgb) -> String {
+    format!("[{}, {}, {}]", number(c.r), number(c.g), number(c.b))
+}
+
+/// Text as YAML takes it for text, whatever it holds: JSON's strings are YAML's.
+fn quoted(text: &str) -> String {
+    let plain = !text.is_empty()
+        && text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '/'))
+        && !["true", "false", "null", "yes", "no", "on", "off", "y", "n", "inf", "nan"]
+            .iter()
+            .any(|word| text.eq_ignore_ascii_case(word));
+    if plain { text.to_owned() } else { serde_json::Value::from(text).to_string() }
+}

@@ -1,0 +1,78 @@
+//! `pipeline convert`, and laying its libraries over scenes.
+
+use crate::support::{Desk, SMALL_ARGUMENTS, repository};
+
+fn scene(name: &str) -> String {
+    repository(&format!("scenes/{name}")).to_str().unwrap().to_owned()
+}
+
+fn render(desk: &Desk, scene: &str, more: &[&str]) {
+    desk.run(["render", scene].iter().chain(&SMALL_ARGUMENTS).chain(more)).ends_with(0);
+}
+
+#[test]
+fn an_unedited_library_gives_the_same_picture_and_an_edited_one_another() {
+    let desk = Desk::new("");
+    for file in ["spheres.glb", "cornell.obj", "aris/config/scene/cbox_balls.yaml"] {
+        let scene = scene(file);
+        desk.run(["convert", &scene, "-o", "lib"]).ends_with(0).says("fields: ");
+        render(&desk, &scene, &["-o", "plain.exr"]);
+        render(&desk, &scene, &["-o", "laid.exr", "--materials", "lib/materials.yaml"]);
+        let pixels =
+            |name: &str| desk.raster(name).layers.into_iter().map(|l| l.channels).collect::<Vec<_>>();
+        assert_eq!(pixels("plain.exr"), pixels("laid.exr"), "{file}");
+    }
+    let spheres = scene("spheres.glb");
+    std::fs::write(desk.path("edited.yaml"), "floor: {roughness: 0.05, metallic: 1}\n").unwrap();
+    render(&desk, &spheres, &["-o", "edited.exr", "--materials", "edited.yaml"]);
+    render(&desk, &spheres, &["-o", "plain.exr"]);
+    let set = ["--set", "material.floor.roughness=0.05", "--set", "material.floor.metallic=1"];
+    render(&desk, &spheres, &[&["-o", "set.exr"], &set[..]].concat());
+    let picture = |name: &str| desk.raster(name).layers.swap_remove(0).channels;
+    assert_ne!(picture("edited.exr"), picture("plain.exr"));
+    assert_eq!(picture("edited.exr"), picture("set.exr"));
+}
+
+#[test]
+fn a_manifest_lays_a_library_over_its_scenes_and_a_changed_one_renders_again() {
+    let manifest = format!(
+        "scene = {:?}\nmaterials = \"library.yaml\"\n[render]\nwidth = 24\nheight = 18\nspp = 2\n",
+        scene("spheres.glb")
+    );
+    let desk = Desk::new(&manifest);
+    let library = |text: &str| std::fs::write(desk.path("library.yaml"), text).unwrap();
+    library("floor: {roughness: 0.05}\n");
+    desk.sweep(&[]).ends_with(0).says("1 rendered, 0 reused");
+    desk.sweep(&[]).ends_with(0).says("0 rendered, 1 reused");
+    library("floor: {roughness: 0.5}\n");
+    desk.sweep(&[]).ends_with(0).says("1 rendered, 0 reused");
+    library("flor: {roughness: 0.5}\n");
+    desk.sweep(&[]).ends_with(2);
+    desk.run(["render", &scene("spheres.glb"), "-o", "a.exr", "--materials", "library.yaml"])
+        .ends_with(2)
+        .tells("library.yaml:1:1: the scene has no material `flor`")
+        .tells("did you mean `floor`?");
+}
+
+#[test]
+fn a_folder_is_converted_in_one_go_and_a_broken_file_does_not_stop_the_rest() {
+    let desk = Desk::new("");
+    let assets = desk.path("assets");
+    std::fs::create_dir_all(assets.join("sub")).unwrap();
+    std::fs::copy(scene("spheres.glb"), assets.join("sub/spheres.glb")).unwrap();
+    std::fs::write(assets.join("broken.glb"), "glTF").unwrap();
+    std::fs::copy(scene("cornell.obj"), assets.join("cornell.obj")).unwrap();
+    std::fs::copy(scene("cornell.mtl"), assets.join("cornell.mtl")).unwrap();
+    let run = desk.run(["convert", "assets", "-o", "out", "--report", "json"]).ends_with(2);
+    let run = run.tells("error: assets/broken.glb");
+    let report: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    let scenes: Vec<&str> = report.as_array().unwrap().iter().map(|s| s["scene"].as_str().unwrap()).collect();
+    assert_eq!(scenes, ["assets/cornell.obj", "assets/sub/spheres.glb"]);
+    assert!(report[1]["notes"].as_array().unwrap().iter().any(|n| n["quality"] == "carried"));
+    assert_eq!(desk.names("out"), ["cornell", "sub"]);
+    assert_eq!(desk.names("out/sub/spheres"), ["materials.yaml", "textures"]);
+    let page =
+        desk.run(["convert", "assets/cornell.obj", "-o", "out", "--report", "html"]).ends_with(0).stdout;
+    assert!(page.starts_with("<!doctype html>") && !page.contains("http"));
+    desk.run(["convert", "results", "-o", "out"]).ends_with(2);
+}
