@@ -17,16 +17,14 @@ pub fn table(exported: &Exported, width: Option<u16>) -> String {
     if let Some(width) = width {
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
     }
-    let mut last = None;
+    let mut above: Option<&Note> = None;
     for note in &exported.notes {
-        let material = if last == Some(&note.material) { String::new() } else { printable(&note.material) };
-        last = Some(&note.material);
-        table.add_row([
-            material,
-            printable(&note.field),
-            note.quality.name().into(),
-            printable(&note.reason),
-        ]);
+        let same = above.filter(|above| above.material == note.material);
+        let material = if same.is_some() { String::new() } else { printable(&note.material) };
+        let repeats = same.is_some_and(|above| above.reason == note.reason && !note.reason.is_empty());
+        let reason = if repeats { "\"".to_owned() } else { printable(&note.reason) };
+        above = Some(note);
+        table.add_row([material, printable(&note.field), note.quality.name().into(), reason]);
     }
     let rows = if exported.notes.is_empty() { String::new() } else { format!("{}\n\n", table.trim_fmt()) };
     format!("{rows}{}\n", summary(exported))
