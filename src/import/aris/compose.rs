@@ -245,18 +245,16 @@ impl Composer<'_> {
         Ok(())
     }
 
-    /// A group that is named twice must be the same twice.
+    /// A group stands once in all lists.
     fn note_choice(&mut self, key: &str, options: &[String], by: &Node) -> Result<(), ArisError> {
-        let now = options.join(", ");
+        let now = options.join(",");
         match self.known.insert(key.to_owned(), now.clone()) {
-            Some(before) if before != now => Err(unsupported(
+            None => Ok(()),
+            Some(before) => Err(unsupported(
                 by.place.clone(),
-                &format!("{key} is to be {now} here and {before} elsewhere"),
-                &format!(
-                    "change the one there is: {key}={now}, or `override {key}: {now}` in a defaults list"
-                ),
+                &format!("{key} is {before} already"),
+                &format!("change that one: {key}={now}, or `override {key}: {now}` in a defaults list"),
             )),
-            _ => Ok(()),
         }
     }
 

@@ -34,16 +34,17 @@ pub(super) fn read(
     }
     read_integrator(integrator, &mut settings)?;
     if let (Some((width, height)), Some(node)) = (size, scale) {
-        let scale = node.number("scale")?;
+        node.number("scale")?;
+        let scale = decimal(node);
         // The default, -1, is no scale.
         if scale > 0.0 {
             let scaled = |side: u32| {
-                let pixels = f64::from(side) * decimal(node);
+                let pixels = f64::from(side) * scale;
                 if (1.0..=65_536.0).contains(&pixels) {
                     Ok(pixels as u32)
                 } else {
                     let expected = format!("such that {side} pixels become between 1 and 65536");
-                    Err(node.out_of_range("scale", f64::from(scale), expected))
+                    Err(node.out_of_range("scale", scale, expected))
                 }
             };
             (settings.width, settings.height) = (Some(scaled(width)?), Some(scaled(height)?));

@@ -84,10 +84,8 @@ fn scalar_text(text: &str) -> String {
 
 fn is_plain(text: &str) -> bool {
     let begins_well = text.starts_with(|c: char| c.is_alphabetic() || matches!(c, '/' | '_' | '\\'));
-    let means_something = matches!(
-        text.to_ascii_lowercase().as_str(),
-        "null" | "true" | "false" | "yes" | "no" | "on" | "off" | "y" | "n"
-    );
+    let means_something =
+        matches!(text.to_ascii_lowercase().as_str(), "null" | "true" | "false" | "yes" | "no" | "on" | "off");
     let is_structural = text.contains([',', '[', ']', '{', '}', '#', '$']) || text.contains(": ");
     begins_well && !means_something && !is_structural && !text.ends_with([' ', ':'])
 }
