@@ -72,7 +72,8 @@ pub enum Integrator {
     Ao,
     /// Emission and direct light, also behind specular reflection and refraction.
     Whitted,
-    /// The irradiance of a point light over π, whatever the material.
+    /// The irradiance of a point light over π, whatever the material. Only Aris' configurations name it, as its light is theirs.
+    #[schemars(skip)]
     Point {
         /// Where, in metres.
         position: [f32; 3],
@@ -105,6 +106,13 @@ impl Integrator {
         [I::Path, I::Normals, I::Albedo, I::DiffuseAlbedo, I::Depths, I::Ao, I::Whitted, I::EmitterCheck]
             .into_iter()
             .find(|i| i.name() == name)
+    }
+
+    /// The name, and what of `settings` bears on it and is not as usual, for people.
+    pub fn described(settings: &RenderSettings) -> String {
+        let without = |is_on: bool, what: &'static str| if is_on { "" } else { what };
+        let name = settings.integrator.name();
+        format!("{name}{}{}", without(settings.nee, ", no nee"), without(settings.mis, ", no mis"))
     }
 
     /// Without light in the scene, its picture is black.

@@ -150,7 +150,7 @@ fn what_is_wrong_is_told_with_file_and_key_or_the_override() {
     let desk = Desk::new("");
     let root = small_root(&desk, &[("config/bad.yaml", "defaults:\n  - gone\n")]);
     let bad_list = small_root(&desk, &[]).join("scene/list.yaml");
-    std::fs::write(bad_list, "defaults:\n  - one\n  - brdf: gray\nwidth: 4\n").unwrap();
+    std::fs::write(bad_list, "defaults:\n  - one\n  - override brdf: gray\nwidth: 4\n").unwrap();
     for (overrides, expected) in [
         (&["scene=oen"][..], "the override `scene=oen`: cannot read"),
         (&["scene=oen"], "hint: did you mean \"one\"?"),
@@ -320,6 +320,21 @@ fn composition_is_hydra_s() {
             vec!["ajax", "ajax_simple", "bunny", "cbox", "cbox_base", "cbox_diffuse", "lego", "veach"];
         roots.push((corpus.join("aris/config"), scenes));
     }
+    let odd = odd_root(&desk);
+    roots.push((odd, vec!["one", "odd", "more"]));
+    let of_odd = [
+        "scene=odd scene/brdf=grey",
+        "scene=odd scene.width=7",
+        "scene=more scene/extra=e",
+        "scene=more ~scene/extra",
+        "scene=more scene/deep/group=[x,y]",
+        "scene=more scene.deep.group.numbers.0=2",
+        "scene=more scene.integrator=null",
+        "integrator=[depths,albedo]",
+        "+scene/extra=e",
+        "+scene/extra=gone",
+        "scene/extra=e",
+    ];
     let other = [
         "scene=cbox scene/brdf=cbox_diffuse scene.width=400 spp=50 scale=0.5",
         "scene=cbox scene.camera.name=thin +scene.camera.config.aperture=0.3 ++scene.camera.config.focal_distance=5.0",
@@ -358,7 +373,8 @@ fn composition_is_hydra_s() {
                 cases.push(vec![format!("scene={scene}"), format!("integrator={integrator}")]);
             }
         }
-        cases.extend(other.iter().map(|line| split(line)));
+        let more: &[&str] = if root.starts_with(desk.path("config")) { &of_odd } else { &other };
+        cases.extend(more.iter().map(|line| split(line)));
         let composed: Vec<(&Vec<String>, Option<String>)> = cases
             .iter()
             .map(|overrides| {
@@ -372,6 +388,23 @@ fn composition_is_hydra_s() {
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
         assert_eq!(answer.lines().count(), cases.len());
     }
+}
+
+/// A root that uses more of Hydra than Aris' own.
+fn odd_root(desk: &Desk) -> PathBuf {
+    let odd = "defaults:\n  - _self_\n  - one\n  - override brdf: two\nwidth: 5\nnew: {a: 1}\n";
+    let more = "defaults:\n  - /integrator: albedo\n  - optional brdf: gone\n  - optional nothing\n  - deep/group: x\n  - extra: null\n";
+    let x = "numbers: [1e3, 0x10, .5, -1., '64', 2020-01-01, 1.5e-7, true, ~, '']\ntext: {a: x, b: \"y z\"}\nempty:\n";
+    small_root(
+        desk,
+        &[
+            ("config/scene/odd.yaml", odd),
+            ("config/scene/more.yaml", more),
+            ("config/scene/deep/group/x.yaml", x),
+            ("config/scene/deep/group/y.yaml", "# @package _group_\ntext: {b: q}\nempty: {c: ${..text.a}}\n"),
+            ("config/scene/extra/e.yaml", ""),
+        ],
+    )
 }
 
 /// Words as a shell would take them: spaces within quotes stay.
