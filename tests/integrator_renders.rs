@@ -109,7 +109,7 @@ fn a_point_light_gives_its_formula_and_shadows() {
         with(integrator, small(2, 2, 4, 16))
     };
     let world = plane(Material { model: Model::Mirror, ..Material::default() }, from_above(5.0, 0.002));
-    let expected = 100.0 / (4.0 * std::f32::consts::PI.powi(2)) / 4.0;
+    let expected = 100.0 / (4.0 * std::f32::consts::PI * std::f32::consts::PI) / 4.0;
     let [r, g, b] = first_pixel(&render_scene(&world, &point(2.0)));
     assert!((r / expected - 1.0).abs() < 1e-4 && (g * 2.0 / r - 1.0).abs() < 1e-5 && b == 0.0, "{r} {g}");
     let one_sided = plane(Material { sides: Sides::Front, ..lambert(0.5) }, from_above(5.0, 0.002));

@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use pipeline::color::srgb_from_linear;
 use pipeline::raster::{Attribute, Raster};
 
 use crate::outside::outside;
@@ -71,8 +72,7 @@ fn a_run_writes_what_render_py_writes() {
     let (exr, png) = (desk.raster("here/output.exr"), desk.raster("here/output.png"));
     for (linear, shown) in exr.picture().rgb().unwrap().iter().zip(png.picture().rgb().unwrap()) {
         let code = |v: f32| {
-            let v = v.clamp(0.0, 1.0);
-            let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+            let encoded = srgb_from_linear(v.clamp(0.0, 1.0));
             (encoded * 255.0) as i32
         };
         assert!(
@@ -222,7 +222,7 @@ fn the_key_follows_the_composed_scene() {
         &["spp=2"],
         &["scene.camera.config.fov=80"],
     ]
-    .map(|overrides| key(overrides))
+    .map(key)
     .into();
     assert_eq!(keys.len(), 5);
 }

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::super::{Outcome, Talk, Usage, WELL, print};
 use super::{Arguments, check_folder};
+use crate::cli::{Outcome, Talk, Usage, WELL, print};
 use crate::imagefile;
 use crate::import::ArisConfig;
 use crate::output::tone;

@@ -272,12 +272,13 @@ impl Composer<'_> {
             near if near.starts_with("did") => near,
             _ => format!("the groups there are: {}", known.join(", ")),
         };
-        for (key, choice) in self.choices.iter().filter(|(key, c)| !c.used && !key.starts_with("hydra/")) {
+        let mut unused = self.choices.iter().filter(|(key, c)| !c.used && !key.starts_with("hydra/"));
+        if let Some((key, choice)) = unused.next() {
             let message = format!("no defaults list has the group {key}");
             let hint = format!("{}; to append it, write +{key}={}", hint(key), choice.options.join(","));
             return Err(unsupported(choice.by.place.clone(), &message, &hint));
         }
-        for (key, deletion) in self.deleted.iter().filter(|(_, d)| !d.used) {
+        if let Some((key, deletion)) = self.deleted.iter().find(|(_, d)| !d.used) {
             let what = deletion.option.as_ref().map_or(key.clone(), |option| format!("{key}={option}"));
             let message = format!("no defaults list has {what}");
             return Err(unsupported(deletion.place.clone(), &message, &hint(key)));

@@ -118,8 +118,8 @@ fn find_mut<'a>(tree: &'a mut Node, keys: &[&str]) -> Option<&'a mut Node> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{overrides, write, yaml};
     use super::*;
+    use crate::import::aris::{overrides, write, yaml};
 
     const TREE: &str = "spp: 64\nx: {y: {z: 1}, l: [1, 2, {q: 3}], n: null}\n";
 

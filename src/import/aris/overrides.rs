@@ -334,7 +334,7 @@ mod tests {
     }
 
     fn shown(text: &str) -> String {
-        super::super::write::inline(&value(text))
+        crate::import::aris::write::inline(&value(text))
     }
 
     /// Hydra 1.3.8 gives the same.

@@ -46,23 +46,15 @@ pub(super) fn build(
         scene.instances[i].material = MaterialId(i as u32);
         scene.materials.push(Named::new(name, SourceMaterial::Aris(material)));
     }
+    let alone = |key| {
+        let (place, within) = (config.place.to_string(), "the scene".to_owned());
+        Err(ArisError::Missing { place, within, key })
+    };
     let size = match (width, height) {
         (Some(w), Some(h)) => Some((w.whole("width", 1, MAX_SIDE)?, h.whole("height", 1, MAX_SIDE)?)),
         (None, None) => None,
-        (Some(_), None) => {
-            return Err(ArisError::Missing {
-                place: config.place.to_string(),
-                within: "the scene".to_owned(),
-                key: "height",
-            });
-        }
-        (None, Some(_)) => {
-            return Err(ArisError::Missing {
-                place: config.place.to_string(),
-                within: "the scene".to_owned(),
-                key: "width",
-            });
-        }
+        (Some(_), None) => return alone("height"),
+        (None, Some(_)) => return alone("width"),
     };
     scene.cameras.push(Named::new("camera", read_camera(camera, size)?));
     if let Some(environment) = environment {

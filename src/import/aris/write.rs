@@ -92,8 +92,8 @@ fn is_plain(text: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::yaml;
     use super::*;
+    use crate::import::aris::yaml;
 
     #[test]
     fn what_is_written_is_read_as_the_same() {
