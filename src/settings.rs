@@ -31,6 +31,94 @@ pub struct RenderSettings {
     pub filter_radius: Option<f32>,
     /// Which camera of the scene, by name; the first where absent.
     pub camera: Option<String>,
+    /// What is worked out along each camera ray.
+    #[serde(skip_serializing_if = "is_default")]
+    pub integrator: Integrator,
+    /// Sample lights at every scattering; without it paths find light by chance alone, except from lights without extent.
+    #[serde(skip_serializing_if = "is_true")]
+    pub nee: bool,
+    /// Weigh light and BSDF samples against each other; without it light that `nee` samples is found by it alone.
+    #[serde(skip_serializing_if = "is_true")]
+    pub mis: bool,
+}
+
+// What a setting is by default is left out of identities, so that a setting more changes none.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_true(value: &bool) -> bool {
+    *value
+}
+
+/// What is worked out along each camera ray: radiance, or a look at something else. All but `path` are Aris' and mean what they
+/// mean there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Integrator {
+    /// Radiance, by path tracing.
+    #[default]
+    Path,
+    /// Each axis' absolute value of the shading normal in the world.
+    Normals,
+    /// The base colour; white for `mirror` and `dielectric`.
+    Albedo,
+    /// The colour of `diffuse` materials; black for all others, as Aris' `albedo`.
+    DiffuseAlbedo,
+    /// One over the depth along the viewing axis, in 1/m.
+    Depths,
+    /// The unoccluded part of the hemisphere, weighed by the cosine.
+    Ao,
+    /// Emission and direct light, also behind specular reflection and refraction.
+    Whitted,
+    /// The irradiance of a point light over π, whatever the material. Only Aris' configurations name it, as its light is theirs.
+    #[schemars(skip)]
+    Point {
+        /// Where, in metres.
+        position: [f32; 3],
+        /// The power Φ of each channel, in watts.
+        energy: [f32; 3],
+    },
+    /// Direct light without the cosines at surface and light: the integral of Le·V·f/d² over the lights' areas.
+    EmitterCheck,
+}
+
+impl Integrator {
+    /// The name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Normals => "normals",
+            Self::Albedo => "albedo",
+            Self::DiffuseAlbedo => "diffuse_albedo",
+            Self::Depths => "depths",
+            Self::Ao => "ao",
+            Self::Whitted => "whitted",
+            Self::Point { .. } => "point",
+            Self::EmitterCheck => "emitter_check",
+        }
+    }
+
+    /// The integrator of that name, of those that need no values of their own.
+    pub fn from_name(name: &str) -> Option<Self> {
+        use Integrator as I;
+        [I::Path, I::Normals, I::Albedo, I::DiffuseAlbedo, I::Depths, I::Ao, I::Whitted, I::EmitterCheck]
+            .into_iter()
+            .find(|i| i.name() == name)
+    }
+
+    /// The name, and what of `settings` bears on it and is not as usual, for people.
+    pub fn described(settings: &RenderSettings) -> String {
+        let without = |is_on: bool, what: &'static str| if is_on { "" } else { what };
+        let name = settings.integrator.name();
+        format!("{name}{}{}", without(settings.nee, ", no nee"), without(settings.mis, ", no mis"))
+    }
+
+    /// Without light in the scene, its picture is black.
+    pub const fn needs_light(self) -> bool {
+        matches!(self, Self::Path | Self::Whitted | Self::EmitterCheck)
+    }
 }
 
 /// A pixel filter, sampled by importance, so that every sample has the same weight and no pixel shares samples with another.
@@ -44,6 +132,8 @@ pub enum Filter {
     Tent,
     /// Blackman-Harris, as in Cycles; radius 0.75 by default.
     BlackmanHarris,
+    /// All samples at the pixel's centre: no antialiasing.
+    Point,
 }
 
 impl Filter {
@@ -53,6 +143,7 @@ impl Filter {
             Self::Box => "box",
             Self::Tent => "tent",
             Self::BlackmanHarris => "blackman-harris",
+            Self::Point => "point",
         }
     }
 }
@@ -69,6 +160,9 @@ impl Default for RenderSettings {
             filter: Filter::Box,
             filter_radius: None,
             camera: None,
+            integrator: Integrator::Path,
+            nee: true,
+            mis: true,
         }
     }
 }

@@ -12,7 +12,8 @@ use pipeline::sweep;
 fn jobs_of_the_roughness_sweep_are_their_references() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let sweep = sweep::open(&root.join("configs/roughness.toml")).expect("the manifest");
-    let loaded = load(&sweep.jobs[0].scene, &Default::default(), &Default::default()).expect("the scene");
+    let loaded =
+        load(&sweep.jobs[0].scene, &Default::default(), &Default::default(), None).expect("the scene");
     let build = Build::current().expect("the executable");
     let folder = tempfile::tempdir().expect("a folder");
     let references = References {

@@ -42,7 +42,6 @@ pub(crate) fn make() -> Result<Vec<Made>, MakeError> {
         file("cornell.obj", obj(&parts), &about),
         file("cornell.mtl", mtl(), "Lambert, the light emits 40"),
         file("aris/config/scene/cbox_base.yaml", base(&parts), "geometry, light, camera"),
-        file("aris/config/scene/environment/none.yaml", "name: none\nconfig: {}\n".into(), "no environment"),
     ];
     for (scene, group, [left, right], about) in variants() {
         let brdf = GROUPS.iter().find(|(name, _)| *name == group).map_or("", |(_, path)| *path);

@@ -6,6 +6,7 @@
 //! cargo run --release --example make_scenes -- --out DIR # write or check elsewhere
 //! ```
 
+mod aris_root;
 mod ball;
 mod cornell;
 mod field;
@@ -70,7 +71,7 @@ fn main() -> ExitCode {
 fn run() -> Result<ExitCode, MakeError> {
     let (mode, folder) = arguments()?;
     let mut different = 0u32;
-    for make in [cornell::make, spheres::make, ball::make, statue::make] {
+    for make in [cornell::make, aris_root::make, spheres::make, ball::make, statue::make] {
         for made in make()? {
             let path = folder.join(made.path);
             let verdict = match mode {

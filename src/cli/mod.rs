@@ -28,6 +28,11 @@ const FAILED: u8 = 2;
 /// The arguments are wrong.
 const USAGE: u8 = 64;
 
+/// Arguments that do not go together, which only the files they name could tell.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Usage(String);
+
 /// What a command ends with.
 type Outcome = Result<u8, Box<dyn Error>>;
 
@@ -79,7 +84,7 @@ pub fn main() -> ExitCode {
             // Each of a manifest's errors has a heading of its own.
             let is_headed = matches!(error.downcast_ref(), Some(SweepError::Manifest(_)));
             tell(&if is_headed { error.to_string() } else { format!("error: {error}") });
-            ExitCode::from(FAILED)
+            ExitCode::from(if error.is::<Usage>() { USAGE } else { FAILED })
         }
     }
 }

@@ -1,37 +1,52 @@
 //! `pipeline render`.
 
+mod config_root;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use self::config_root::{Outputs, Shown};
 use super::progress::Progress;
 use super::{Outcome, Talk, WELL, print};
 use crate::convert::ConvertOptions;
 use crate::disney::DiffuseModel;
 use crate::imagefile;
-use crate::import::{ImportOptions, LightUnits};
-use crate::job::{self, Build, JobError, LoadedScene, PlannedJob};
+use crate::import::{ArisConfig, ImportOptions, LightUnits};
+use crate::job::{self, Build, JobError, LoadedRun, LoadedScene, PlannedJob};
 use crate::output::{stamp, tone};
 use crate::raster::Raster;
 use crate::record::{Job, Override, Value};
 use crate::render::{Control, Prepared, RenderError, render, replay};
 use crate::settings::{Display, Filter, RenderSettings, ToneCurve};
 
-/// Render a scene: glTF, OBJ, or an Aris YAML scene.
+/// Render a scene: glTF, OBJ, an Aris YAML scene, or a config root of Aris.
 ///
 /// The result is an EXR of two parts, the picture and its data (albedo, normal, depth, variance, samples), or a PNG if the
 /// output's name ends so.
+///
+/// A config root is a folder with render.yaml. It is composed with overrides as Aris' render.py (Hydra) does: scene=cbox chooses
+/// from a group, scene/brdf=cbox_diffuse from a nested one, scene.width=400 changes a value, +key=value adds one, ~key deletes one.
+/// Without -o, output.png, config.yaml and, with save_exr=true, output.exr go to hydra.run.dir, or below outputs/ to a folder
+/// named after the overrides.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline render scenes/shaderball.glb -o ball.png --spp 256 --set material.ball.roughness=0.1\n  pipeline render model.obj -o model.exr --width 800 --set environment.rotation=90\n  pipeline render model.glb -o model.exr --materials edited.yaml\n  pipeline render scenes/shaderball.glb --pixel 320,240 --sample 3"
+    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline render scenes/shaderball.glb -o ball.png --spp 256 --set material.ball.roughness=0.1\n  pipeline render model.obj -o model.exr --width 800 --set environment.rotation=90\n  pipeline render scenes/shaderball.glb -o normals.png --set render.integrator=normals\n  pipeline render model.glb -o model.exr --materials edited.yaml\n  pipeline render scenes/shaderball.glb --pixel 320,240 --sample 3\n  pipeline render scenes/aris/config scene=cbox integrator=path_mis spp=50 scale=0.5\n  pipeline render scenes/aris/config scene=cbox +scene.camera.config.aperture=0.1 --cfg"
 )]
 pub(super) struct Arguments {
-    /// The scene.
+    /// The scene, or the folder of a config root.
     scene: PathBuf,
+    /// Overrides of a config root, as Hydra takes them.
+    #[arg(value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
     /// The image to write, .exr or .png.
-    #[arg(short, long, value_name = "FILE", required_unless_present = "pixel")]
+    #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Set a path of the scene, as in a manifest: material.NAME.FIELD, camera.FIELD, light.NAME.FIELD, environment.FIELD.
+    /// Print the composed configuration of a config root, or with =origin where each value comes from, instead of rendering.
+    #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "config", conflicts_with_all = ["output", "pixel"])]
+    cfg: Option<Shown>,
+    /// Set a path of the scene, as in a manifest: material.NAME.FIELD, camera.FIELD, light.NAME.FIELD, environment.FIELD,
+    /// render.FIELD.
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
     set: Vec<Override>,
     /// Samples a pixel.
@@ -121,15 +136,24 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     // Before minutes are spent on an image that can't be kept.
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     arguments.output.as_deref().map(check_folder).transpose()?;
+    let config = config_root::composed(arguments)?;
+    if let (Some(config), Some(shown)) = (&config, arguments.cfg) {
+        return config_root::show(config, shown);
+    }
     let import_options = ImportOptions {
         light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
     };
     let convert_options = ConvertOptions { diffuse: arguments.diffuse };
     let materials = arguments.materials.as_deref();
-    let loaded =
-        job::load(&arguments.scene, &import_options, &convert_options, materials).map_err(with_hint)?;
+    let run = match &config {
+        Some(config) => job::load_configured(config, &convert_options, materials),
+        None => job::load(&arguments.scene, &import_options, &convert_options, materials)
+            .map(|loaded| LoadedRun { loaded, settings: RenderSettings::default(), save_exr: false }),
+    };
+    let LoadedRun { loaded, settings, save_exr } = run.map_err(with_hint)?;
     let build = Build::current()?;
-    let planned = job::plan(&described(arguments), &loaded, &build).map_err(with_hint)?;
+    let planned =
+        job::plan(&described(arguments, config.as_ref(), settings), &loaded, &build).map_err(with_hint)?;
     for warning in loaded.warnings.iter().chain(&planned.warnings) {
         talk.say(&format!("warning: {warning}"));
     }
@@ -138,12 +162,21 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     if let Some((x, y)) = arguments.pixel {
         return tell_path(&prepared, &planned, x, y, arguments.sample);
     }
+    let outputs = match &config {
+        Some(config) if format.is_none() => {
+            Some(Outputs::prepare(config, save_exr, planned.settings.integrator)?)
+        }
+        _ => None,
+    };
     let mut rendered = render_with_progress(&prepared, &planned, &loaded, talk)?;
     stamp(&mut rendered, &planned.provenance(&build));
+    if let Some(config) = &config {
+        config_root::stamp_config(&mut rendered, config);
+    }
     if let (Some(output), Some(format)) = (&arguments.output, format) {
         write(output, format, &rendered, &Display { tone: arguments.tone, exposure: arguments.exposure })?;
     }
-    Ok(WELL)
+    outputs.map_or(Ok(WELL), |outputs| outputs.write(&rendered, talk))
 }
 
 /// The error with what may help below it.
@@ -154,23 +187,35 @@ fn with_hint(error: JobError) -> Box<dyn std::error::Error> {
     }
 }
 
-/// The job that the arguments describe.
-fn described(arguments: &Arguments) -> Job {
-    let default = RenderSettings::default();
-    let settings = RenderSettings {
-        width: arguments.width,
-        height: arguments.height,
-        spp: arguments.spp.unwrap_or(default.spp),
-        seed: arguments.seed.unwrap_or(default.seed),
-        max_depth: arguments.max_depth.unwrap_or(default.max_depth),
-        replicates: arguments.replicates.unwrap_or(default.replicates),
-        filter: arguments.filter.unwrap_or(default.filter),
-        camera: arguments.camera.clone(),
-        ..default
+/// The job that the arguments describe: what they say, and else what `base` is.
+fn described(arguments: &Arguments, config: Option<&ArisConfig>, base: RenderSettings) -> Job {
+    let spp = arguments.spp.unwrap_or(base.spp);
+    let filter = match (arguments.filter, config) {
+        (Some(filter), _) => filter,
+        // Aris' single sample is not moved.
+        (None, Some(_)) if spp == 1 => Filter::Point,
+        (None, Some(_)) => Filter::Box,
+        (None, None) => base.filter,
     };
-    let stem = arguments.scene.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    // A side alone keeps the camera's aspect.
+    let (width, height) = match (arguments.width, arguments.height) {
+        (None, None) => (base.width, base.height),
+        size => size,
+    };
+    let settings = RenderSettings {
+        width,
+        height,
+        spp,
+        filter,
+        seed: arguments.seed.unwrap_or(base.seed),
+        max_depth: arguments.max_depth.unwrap_or(base.max_depth),
+        replicates: arguments.replicates.unwrap_or(base.replicates),
+        camera: arguments.camera.clone(),
+        ..base
+    };
+    let stem = || arguments.scene.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     Job {
-        name: stem,
+        name: config.map_or_else(stem, |config| config.name().to_owned()),
         scene: arguments.scene.clone(),
         overrides: arguments.set.clone(),
         settings,

@@ -93,6 +93,20 @@ impl Files {
         self.locate(name).is_ok_and(|path| path.is_file())
     }
 
+    /// Whether `name` is a folder inside the folder.
+    pub fn is_folder(&self, name: &str) -> bool {
+        self.locate(name).is_ok_and(|path| path.is_dir())
+    }
+
+    /// The names in the folder `name`, in order; none if it can't be read.
+    pub fn names_in(&self, name: &str) -> Vec<String> {
+        let entries = self.locate(name).ok().and_then(|path| path.read_dir().ok());
+        let mut names: Vec<String> =
+            entries.into_iter().flatten().filter_map(|e| e.ok()?.file_name().into_string().ok()).collect();
+        names.sort_unstable();
+        names
+    }
+
     /// The scene's folder, absolute.
     pub fn root(&self) -> &Path {
         &self.root

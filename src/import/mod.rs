@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-pub use aris::ArisError;
 pub(crate) use aris::yaml;
+pub use aris::{ArisConfig, ArisError, ArisRun};
 pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
 pub use images::{EnvironmentError, read_environment, read_image};
@@ -142,6 +142,18 @@ pub fn import_bytes(path: &Path, bytes: &[u8], options: &ImportOptions) -> Resul
     let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
     files.note(name, bytes);
     import_with(files, path, name, dialect, bytes, options)
+}
+
+/// The scene of a composed configuration of Aris, and how to render it.
+///
+/// # Errors
+/// As for [`import`]: the messages name file and key, or the override.
+pub fn import_configured(config: &ArisConfig) -> Result<ArisRun, ImportError> {
+    let mut run = config.import().map_err(Box::new)?;
+    let Imported { scene, warnings, .. } = &mut run.imported;
+    validate::validate(scene, config.name(), warnings)
+        .map_err(|cause| ImportError::Invalid { path: config.name().into(), cause })?;
+    Ok(run)
 }
 
 fn name_and_dialect(path: &Path) -> Result<(&str, Dialect), ImportError> {

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use super::JobError;
 use crate::convert::{ConvertOptions, Note, to_disney};
-use crate::import::{FileDigest, ImportOptions, import};
+use crate::import::{ArisConfig, ArisRun, FileDigest, ImportOptions, Imported, import, import_configured};
 use crate::library::Library;
 use crate::record::Warning;
 use crate::render::Geometry;
 use crate::scene::{Named, Scene, framing, studio};
+use crate::settings::RenderSettings;
 
 /// A scene, converted and completed, with its triangles in a tree.
 #[derive(Clone, Debug)]
@@ -41,6 +42,70 @@ pub fn load(
     materials: Option<&Path>,
 ) -> Result<LoadedScene, JobError> {
     let imported = import(path, import_options)?;
+    let place = path.display().to_string();
+    let options = (import_options, convert_options);
+    loaded(imported, options, materials, |scene, warnings| complete(scene, &place, warnings))
+}
+
+/// What a config root's run renders.
+#[derive(Clone, Debug)]
+pub struct LoadedRun {
+    /// The scene, converted.
+    pub loaded: LoadedScene,
+    /// How it is rendered.
+    pub settings: RenderSettings,
+    /// Whether the configuration asks for an EXR beside the PNG.
+    pub save_exr: bool,
+}
+
+/// Imports and converts the scene of an Aris configuration. Nothing is added to it: without light it is black, and a warning says
+/// so.
+///
+/// # Errors
+/// If the scene can't be read, or has nothing to render.
+pub fn load_configured(
+    config: &ArisConfig,
+    convert_options: &ConvertOptions,
+    materials: Option<&Path>,
+) -> Result<LoadedRun, JobError> {
+    let ArisRun { imported, settings, save_exr } = import_configured(config)?;
+    let options = (&ImportOptions::default(), convert_options);
+    let loaded = loaded(imported, options, materials, |scene, warnings| {
+        if settings.integrator.needs_light() && !studio::is_lit(scene) {
+            let what =
+                "no light: the picture will be black; scene/environment=… or scene.emitters may give some";
+            warnings.push(Warning::new(config.name(), what));
+        }
+    })?;
+    Ok(LoadedRun { loaded, settings, save_exr })
+}
+
+/// Adds a camera and light where there are none.
+fn complete(scene: &mut Scene, place: &str, warnings: &mut Vec<Warning>) {
+    if scene.cameras.is_empty() {
+        let camera = framing::frame(scene);
+        scene.cameras.push(Named::new("default", camera));
+        warnings.push(Warning::new(
+            place,
+            "no camera: the whole scene is framed from three quarters, unless camera.* is set",
+        ));
+    }
+    if !studio::is_lit(scene) {
+        studio::add_studio_lighting(scene);
+        warnings.push(Warning::new(
+            place,
+            "no light: a studio environment is added (glowing textures do not count), unless environment.* is set",
+        ));
+    }
+}
+
+/// Converts an imported scene, has it completed, and builds its tree.
+fn loaded(
+    imported: Imported,
+    (import_options, convert_options): (&ImportOptions, &ConvertOptions),
+    materials: Option<&Path>,
+    complete: impl FnOnce(&mut Scene, &mut Vec<Warning>),
+) -> Result<LoadedScene, JobError> {
     let converted = to_disney(imported.scene, convert_options);
     let mut scene = converted.scene;
     let mut warnings = imported.warnings;
@@ -52,22 +117,7 @@ pub fn load(
         files.extend(read);
         warnings.extend(noticed);
     }
-    let place = path.display().to_string();
-    if scene.cameras.is_empty() {
-        let camera = framing::frame(&scene);
-        scene.cameras.push(Named::new("default", camera));
-        warnings.push(Warning::new(
-            &place,
-            "no camera: the whole scene is framed from three quarters, unless camera.* is set",
-        ));
-    }
-    if !studio::is_lit(&scene) {
-        studio::add_studio_lighting(&mut scene);
-        warnings.push(Warning::new(
-            &place,
-            "no light: a studio environment is added (glowing textures do not count), unless environment.* is set",
-        ));
-    }
+    complete(&mut scene, &mut warnings);
     let geometry = Arc::new(Geometry::build(&scene)?);
     Ok(LoadedScene {
         scene: Arc::new(scene),

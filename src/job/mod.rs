@@ -10,7 +10,7 @@ mod run;
 use std::path::PathBuf;
 
 pub use identity::Build;
-pub use load::{LoadedScene, load};
+pub use load::{LoadedRun, LoadedScene, load, load_configured};
 pub use run::{
     Destination, PlannedJob, References, failed_record, finished, image_path, plan, recheck, record_path,
     recorded, reference_of, run,

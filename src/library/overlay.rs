@@ -92,8 +92,8 @@ impl Overlay<'_> {
     }
 
     fn index_of(&mut self, material: &mut Material, key: &str, node: &Node) -> Result<(), LibraryError> {
-        let index = match node.value {
-            yaml::Value::Number(n) if n > 0.0 && (n as f32).is_finite() => n as f32,
+        let index = match number(node) {
+            Ok(index) if index > 0.0 => index,
             _ => return Err(form(&node.place, &format!("`{key}` must be a number above 0"))),
         };
         let now = material.scalar(Parameter::Ior).constant().unwrap_or(Parameter::Ior.default());
@@ -231,6 +231,7 @@ fn known_of_texture() -> String {
 fn value(node: &Node) -> Option<Value> {
     Some(match &node.value {
         yaml::Value::Number(n) => Value::Number(*n),
+        yaml::Value::Whole(n) => Value::Number(*n as f64),
         yaml::Value::Text(text) => Value::Text(text.clone()),
         yaml::Value::List(items) => Value::List(items.iter().map(value).collect::<Option<_>>()?),
         yaml::Value::Bool(b) => Value::Bool(*b),
@@ -239,8 +240,8 @@ fn value(node: &Node) -> Option<Value> {
 }
 
 fn number(node: &Node) -> Result<f32, LibraryError> {
-    match node.value {
-        yaml::Value::Number(n) if (n as f32).is_finite() => Ok(n as f32),
+    match value(node) {
+        Some(Value::Number(n)) if (n as f32).is_finite() => Ok(n as f32),
         _ => Err(form(&node.place, "a number is expected")),
     }
 }

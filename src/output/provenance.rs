@@ -2,7 +2,7 @@
 
 use crate::raster::{Attribute, Raster};
 use crate::record::Job;
-use crate::settings::RenderSettings;
+use crate::settings::{Integrator, RenderSettings};
 
 /// What an image's header tells about its origin.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +40,7 @@ pub fn stamp(raster: &mut Raster, provenance: &Provenance<'_>) {
         ("pipeline:feature_level", text(provenance.feature_level)),
         ("pipeline:filter", text(&provenance.filter())),
         ("pipeline:identity", text(provenance.identity)),
+        ("pipeline:integrator", text(&Integrator::described(settings))),
         ("pipeline:job", text(&provenance.job.name)),
         ("pipeline:key", text(provenance.key)),
         ("pipeline:max_depth", Attribute::Int(settings.max_depth as i32)),

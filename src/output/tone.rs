@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use crate::color::{Rgb, srgb_from_linear};
+use crate::scene::texture::Encoding;
 use crate::settings::{Display, ToneCurve};
 
 /// The code of a pixel that is NaN or infinite: magenta, which no curve gives to a grey.
@@ -32,6 +33,21 @@ pub fn to_srgb8(rgb: [&[f32]; 3], display: &Display) -> Vec<u8> {
         }
     });
     codes
+}
+
+/// The 8-bit codes that Aris' `render.py` gives a picture: clipped, encoded as sRGB or left as they are, times 255, truncated. White
+/// encodes to just below 1, in single as in double precision, and becomes 254.
+pub fn truncated_to_8_bits(rgb: [&[f32]; 3], encoding: Encoding) -> Vec<u8> {
+    let code = |value: f32| {
+        let clipped = value.clamp(0.0, 1.0);
+        let encoded = match encoding {
+            Encoding::Srgb => srgb_from_linear(clipped),
+            Encoding::Linear => clipped,
+        };
+        (encoded * 255.0) as u8
+    };
+    let [r, g, b] = rgb;
+    r.iter().zip(g).zip(b).flat_map(|((&r, &g), &b)| [r, g, b].map(code)).collect()
 }
 
 /// A [`Display`] with its exposure as a factor.
@@ -162,6 +178,15 @@ mod tests {
         assert_eq!(shown(ToneCurve::Srgb, [0.18; 3]), [118; 3]);
         assert_eq!(shown(ToneCurve::Srgb, [0.0, 1.0, 7.0]), [0, 255, 255]);
         assert_eq!(shown(ToneCurve::Srgb, [-3.0, 0.214_041_14, 0.002]), [0, 128, 7]);
+    }
+
+    #[test]
+    fn aris_codes_are_truncated() {
+        let plane = [-1.0, 0.18, 0.5, 0.999, 2.0];
+        let reds =
+            |encoding| truncated_to_8_bits([&plane; 3], encoding).into_iter().step_by(3).collect::<Vec<_>>();
+        assert_eq!(reds(Encoding::Srgb), [0, 117, 187, 254, 254]);
+        assert_eq!(reds(Encoding::Linear), [0, 45, 127, 254, 255]);
     }
 
     #[test]

@@ -13,6 +13,9 @@ pub(super) struct FilmCamera {
     world_from_camera: Affine3A,
     /// Unit viewing axis in the world: depth is measured along it.
     pub(super) axis: Vec3,
+    origin: Vec3,
+    /// The gradient in the world of the camera's z.
+    depth_gradient: Vec3,
     /// Camera-space x and y per pixel, on the plane one unit away (perspective) or in the film (orthographic).
     per_pixel: f32,
     half_size: Vec2,
@@ -59,6 +62,8 @@ impl FilmCamera {
         Ok(Self {
             world_from_camera,
             axis: Vec3::from(-matrix.z_axis).normalize(),
+            origin: camera.world_from_camera.translation.into(),
+            depth_gradient: matrix.inverse().row(2).into(),
             per_pixel,
             half_size,
             pixel_offset: camera.pixel_offset,
@@ -70,6 +75,11 @@ impl FilmCamera {
     /// The ray from the middle of the lens along the viewing axis.
     pub(super) fn axis_ray(&self) -> Ray {
         Ray::new(Vec3::from(self.world_from_camera.translation), self.axis)
+    }
+
+    /// How far `point` lies in front along the camera's own -z, in units of its matrix: the parameter t of the ray (x/f, y/f, -1).
+    pub(super) fn depth_of(&self, point: Vec3) -> f32 {
+        (self.origin - point).dot(self.depth_gradient)
     }
 
     /// The ray of a film position in pixels from the top left corner; its direction has unit length.

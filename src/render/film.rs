@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::path::{PathSample, ReplayVertex, trace};
+use super::integrators::integrate;
+use super::path::{PathSample, ReplayVertex};
 use super::{Prepared, RenderError};
 use crate::color::Rgb;
 use crate::math::sobol::{Purpose, Sampler};
@@ -190,7 +191,7 @@ pub(super) fn sample_pixel(
     let [u0, u1, u2, u3] = sampler.set(0, Purpose::Camera);
     let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
     let film = center + Vec2::new(scene.filter.offset(u0), scene.filter.offset(u1));
-    trace(scene, &sampler, scene.camera.ray(film, [u2, u3]), inspect)
+    integrate(scene, &sampler, scene.camera.ray(film, [u2, u3]), inspect)
 }
 
 /// The two parts of the result: `beauty` alone in the first, so that tools that compare first parts compare the picture.

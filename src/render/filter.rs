@@ -14,6 +14,7 @@ pub(super) enum FilterSampler {
     },
     /// Offsets at equal steps of the cumulative distribution.
     Tabulated(Vec<f32>),
+    Point,
 }
 
 /// Steps of a tabulated filter: its variance is kept to one part in a thousand, tails included.
@@ -25,6 +26,7 @@ impl FilterSampler {
         match filter {
             Filter::Box => Self::Box { radius: radius.unwrap_or(0.5) },
             Filter::Tent => Self::Tent { radius: radius.unwrap_or(1.0) },
+            Filter::Point => Self::Point,
             Filter::BlackmanHarris => {
                 let radius = f64::from(radius.unwrap_or(0.75));
                 Self::Tabulated(invert(&blackman_harris).iter().map(|x| (x * radius) as f32).collect())
@@ -37,6 +39,7 @@ impl FilterSampler {
     pub(super) fn offset(&self, u: f32) -> f32 {
         match self {
             Self::Box { radius } => (2.0 * u - 1.0) * radius,
+            Self::Point => 0.0,
             Self::Tent { radius } => {
                 let x = if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() };
                 x * radius
@@ -85,9 +88,10 @@ mod tests {
     #[test]
     fn offsets_have_the_filter_s_moments() {
         let tent = |x: f64| 1.0 - x.abs();
+        assert_eq!(FilterSampler::new(Filter::Point, None).offset(0.9), 0.0);
         for (filter, radius) in [(Filter::Box, 0.5), (Filter::Tent, 1.0), (Filter::BlackmanHarris, 0.75)] {
             let kernel: &dyn Fn(f64) -> f64 = match filter {
-                Filter::Box => &|_| 1.0,
+                Filter::Box | Filter::Point => &|_| 1.0,
                 Filter::Tent => &tent,
                 Filter::BlackmanHarris => &blackman_harris,
             };

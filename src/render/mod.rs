@@ -6,6 +6,7 @@ mod camera;
 mod film;
 mod filter;
 mod geometry;
+mod integrators;
 mod mapped_normal;
 mod material;
 mod medium;

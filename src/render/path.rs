@@ -54,6 +54,35 @@ fn power_heuristic(pdf: f32, other: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
+/// Which of the two ways to find a light count. All combinations have the same expectation.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Strategies {
+    pub(super) nee: bool,
+    pub(super) mis: bool,
+}
+
+impl Strategies {
+    /// What a BSDF sample of density `pdf` counts that found light which light sampling finds with density `pdf_light`.
+    #[inline]
+    fn w_bsdf(self, pdf: f32, pdf_light: f32) -> f32 {
+        match self {
+            Self { nee: true, mis: true } => power_heuristic(pdf, pdf_light),
+            Self { nee: true, mis: false } if pdf_light > 0.0 => 0.0,
+            _ => 1.0,
+        }
+    }
+
+    /// What a light sample of density `pdf` counts that BSDF sampling finds with density `pdf_bsdf`.
+    #[inline]
+    fn w_light(self, pdf: f32, pdf_bsdf: f32) -> f32 {
+        match self {
+            Self { nee: true, mis: true } => power_heuristic(pdf, pdf_bsdf),
+            Self { nee: true, mis: false } => 1.0,
+            Self { nee: false, .. } => 0.0,
+        }
+    }
+}
+
 /// Traces one path. `inspect` is called at each vertex with the radiance gathered so far.
 #[inline]
 pub(super) fn trace(
@@ -62,6 +91,7 @@ pub(super) fn trace(
     camera_ray: Ray,
     mut inspect: impl FnMut(ReplayVertex),
 ) -> PathSample {
+    let strategies = Strategies { nee: scene.settings.nee, mis: scene.settings.mis };
     let mut path = PathSample::default();
     let mut ray = camera_ray;
     let mut beta = Rgb::WHITE;
@@ -76,7 +106,7 @@ pub(super) fn trace(
         path.rays += 1;
         let Some(hit) = next_surface(scene, sampler, vertex, &ray) else {
             if let Some((radiance, pdf_light)) = scene.lights.environment(ray.direction) {
-                let w_bsdf = last_scatter.map_or(1.0, |s| power_heuristic(s.pdf, pdf_light));
+                let w_bsdf = last_scatter.map_or(1.0, |s| strategies.w_bsdf(s.pdf, pdf_light));
                 path.radiance += beta * radiance * w_bsdf * medium::transmittance(medium, f32::INFINITY);
             }
             break;
@@ -93,7 +123,7 @@ pub(super) fn trace(
             let w_bsdf = last_scatter.map_or(1.0, |s| {
                 let distance = (surface.point - s.point).length();
                 let pdf_light = scene.lights.pdf_triangle(surface.triangle, ray.direction, distance);
-                power_heuristic(s.pdf, pdf_light)
+                strategies.w_bsdf(s.pdf, pdf_light)
             });
             path.radiance += beta * emitted * w_bsdf;
         }
@@ -121,8 +151,8 @@ pub(super) fn trace(
         if !shading.bsdf.is_delta() && !scene.lights.is_empty() {
             let [u_light, u0, u1, _] = sampler.set(vertex, Purpose::Light);
             if let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) {
-                path.radiance +=
-                    beta * direct_light(scene, &surface, &shading, &sample, medium, &mut path.rays);
+                path.radiance += beta
+                    * direct_light(scene, &surface, &shading, &sample, strategies, medium, &mut path.rays);
             }
         }
 
@@ -167,7 +197,7 @@ pub(super) fn trace(
 /// The nearest surface that is there for this path: a partly transparent one lets its share of paths pass. Each triangle decides
 /// for itself, so that surfaces in the same plane are as transparent to paths as they are to shadow rays.
 #[inline]
-fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray: &Ray) -> Option<Hit> {
+pub(super) fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray: &Ray) -> Option<Hit> {
     let bvh = &scene.geometry.bvh;
     if scene.all_covered {
         return bvh.closest(ray);
@@ -180,11 +210,12 @@ fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray: &Ray) -> 
 
 /// What arrives from a light sample and is reflected to the viewer, weighed against BSDF sampling.
 #[inline]
-fn direct_light(
+pub(super) fn direct_light(
     scene: &Prepared,
     surface: &Surface<'_>,
     shading: &Shading,
     sample: &LightSample,
+    strategies: Strategies,
     arrived: Medium,
     rays: &mut u64,
 ) -> Rgb {
@@ -206,15 +237,15 @@ fn direct_light(
             let radiance = material.emitted(&scene.scene, &light, normal.dot(sample.wi) < 0.0) * coverage;
             let (point, error) = light.position();
             let target = offset(point, error, normal, -sample.wi);
-            (radiance, power_heuristic(sample.pdf, pdf_bsdf), surface.reach(sample.wi, target))
+            (radiance, strategies.w_light(sample.pdf, pdf_bsdf), surface.reach(sample.wi, target))
         }
         LightPlace::Point { position, radiance } => (radiance, 1.0, surface.reach(sample.wi, position)),
         LightPlace::Far { radiance, is_delta } => {
-            let w_light = if is_delta { 1.0 } else { power_heuristic(sample.pdf, pdf_bsdf) };
+            let w_light = if is_delta { 1.0 } else { strategies.w_light(sample.pdf, pdf_bsdf) };
             (radiance, w_light, surface.leave(sample.wi))
         }
     };
-    if arriving.is_black() {
+    if arriving.is_black() || w_light == 0.0 {
         return Rgb::BLACK;
     }
     *rays += 1;
@@ -230,7 +261,7 @@ fn direct_light(
 
 /// The fraction of light that passes a segment: the product of what each surface on it lets through.
 #[inline]
-fn transmittance(scene: &Prepared, shadow: &Ray) -> Rgb {
+pub(super) fn transmittance(scene: &Prepared, shadow: &Ray) -> Rgb {
     if scene.all_opaque {
         return if scene.geometry.bvh.occluded(shadow) { Rgb::BLACK } else { Rgb::WHITE };
     }
@@ -261,7 +292,12 @@ fn passing_surface(scene: &Prepared, ray: &Ray, hit: &Hit) -> Rgb {
     sheet.map_or(absent, |passing| absent + passing * alpha)
 }
 
-fn first_hit(scene: &Prepared, ray: &Ray, surface: &Surface<'_>, shading: Option<&Shading>) -> FirstHit {
+pub(super) fn first_hit(
+    scene: &Prepared,
+    ray: &Ray,
+    surface: &Surface<'_>,
+    shading: Option<&Shading>,
+) -> FirstHit {
     FirstHit {
         albedo: shading.map_or(Rgb::BLACK, |s| s.bsdf.albedo()),
         normal: shading.map_or(Vec3::ZERO, |s| if s.wo.z < 0.0 { -s.frame.normal } else { s.frame.normal }),

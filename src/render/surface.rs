@@ -89,6 +89,17 @@ impl<'a> Surface<'a> {
         Some(Shading { frame, bsdf: self.material.bsdf(&scene.scene, &self.at), wo })
     }
 
+    /// The shading normal on the front, of two-sided materials on the viewer's side.
+    pub(super) fn front_normal(&self, scene: &Prepared) -> Vec3 {
+        let one_sided = self.material.sides == crate::scene::material::Sides::Front;
+        let normal = self.at.shading_normal(self.normal);
+        match (self.is_front || self.material.is_interface, one_sided) {
+            (true, _) => self.frame_around(scene, normal).normal,
+            (false, true) => normal,
+            (false, false) => self.frame_around(scene, -normal).normal,
+        }
+    }
+
     fn frame_around(&self, scene: &Prepared, normal: Vec3) -> Frame {
         let is_front = self.is_front || self.material.is_interface;
         self.material.frame(&scene.scene, &self.at, normal, is_front, |mapped| {

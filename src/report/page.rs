@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::sheet::{Level, Mark};
 use super::table::{Summary, errors, figure, reason, seconds, word};
 use crate::record::{CrossCheck, JobRecord, Outcome};
+use crate::settings::Integrator;
 
 static TEMPLATE: &str = include_str!("page.html");
 
@@ -189,7 +190,8 @@ fn facts(record: &JobRecord) -> Vec<Fact> {
     fact(
         "settings",
         format!(
-            "spp {}, replicates {}, seed {}, max depth {}, filter {:?}{}{}",
+            "{}, spp {}, replicates {}, seed {}, max depth {}, filter {:?}{}{}",
+            Integrator::described(settings),
             settings.spp,
             settings.replicates,
             settings.seed,

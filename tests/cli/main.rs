@@ -2,6 +2,7 @@
 //!
 //! Scenes are small and manifests are written for each test; every test has a folder of its own.
 
+mod aris;
 mod command_line;
 mod configs;
 mod convert;

@@ -53,7 +53,7 @@ fn an_environment_with_nan_is_rendered_with_zeros_and_the_record_says_how_many()
         settings: RenderSettings { width: Some(16), height: Some(12), spp: 4, ..RenderSettings::default() },
         coordinates: Vec::new(),
     };
-    let loaded = load(&job.scene, &Default::default(), &Default::default()).expect("a scene");
+    let loaded = load(&job.scene, &Default::default(), &Default::default(), None).expect("a scene");
     let build = Build::current().expect("the executable");
     let planned = plan(&job, &loaded, &build).expect("a plan");
     let destination = Destination { folder: folder.path().to_owned(), references: None };

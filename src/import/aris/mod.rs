@@ -1,15 +1,25 @@
-//! Aris scenes: `config/scene/NAME.yaml`, composed as Hydra does, with OBJ meshes and image environments.
+//! Aris: config roots in Hydra's layout, `CONFIG_ROOT/render.yaml` with its groups, and single scenes `config/scene/NAME.yaml`.
 //!
-//! `yaml` reads located trees, `compose` follows `defaults`, and `scene` makes a scene of the result. Paths in a scene are
-//! relative to the folder that holds `config/`, or to the scene file's own where there is no such folder above it.
+//! `yaml` reads located trees; `compose` follows `defaults`; `overrides` reads those of the command line, which `edit` puts into
+//! the tree; `interpolate` resolves `${…}`; `scene` makes a scene of the result and `settings` a render's settings. Paths in a
+//! scene are relative to the folder that holds the config root, or `config/`, or to the scene file's own where there is no such
+//! folder above it.
 //! A material is named after the mesh file of its entry, `sphere1` for `data/meshes/cbox/sphere1.obj`; where several meshes
 //! share a file's name the mesh's index follows: `sphere_0`, `sphere_1`.
 
 mod compose;
+mod edit;
+mod interpolate;
+mod overrides;
+mod root;
 mod scene;
+mod settings;
+mod write;
 pub(crate) mod yaml;
 
 use std::path::Path;
+
+pub use root::{ArisConfig, ArisRun};
 
 use super::{FileError, Files, Imported, ObjError};
 use crate::imagefile::ImageFileError;
@@ -27,7 +37,7 @@ pub enum ArisError {
         cause: FileError,
     },
     /// A file that the scene names cannot be read.
-    #[error("{place}: {}{cause}", if key.is_empty() { String::new() } else { format!("{key}: ") })]
+    #[error("{place}: {}{cause}{hint}", if key.is_empty() { String::new() } else { format!("{key}: ") })]
     File {
         /// Where it is named.
         place: String,
@@ -35,6 +45,8 @@ pub enum ArisError {
         key: String,
         /// The reason.
         cause: FileError,
+        /// What else there is.
+        hint: String,
     },
     /// A configuration file is too large.
     #[error("{file} has {size} bytes; a configuration has at most {max}")]
@@ -178,7 +190,11 @@ pub(super) fn import(path: &Path) -> Result<Imported, ArisError> {
         let cause = std::io::Error::new(std::io::ErrorKind::InvalidInput, "its name is not Unicode");
         failed(FileError::Read { path: path.into(), cause })
     })?;
-    let composed = compose::compose(&mut files, &name)?;
+    let (top, name) = match name.strip_prefix("config/") {
+        Some(name) if config.is_some() => ("config", name),
+        _ => ("", name.as_str()),
+    };
+    let composed = interpolate::resolve(&compose::compose(&mut files, top, name, &[])?)?;
     let mut warnings = Vec::new();
     let scene = scene::build(&mut files, &composed, &mut warnings)?;
     Ok(Imported { scene, warnings, files: files.into_digests() })

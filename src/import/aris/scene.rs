@@ -46,23 +46,15 @@ pub(super) fn build(
         scene.instances[i].material = MaterialId(i as u32);
         scene.materials.push(Named::new(name, SourceMaterial::Aris(material)));
     }
+    let alone = |key| {
+        let (place, within) = (config.place.to_string(), "the scene".to_owned());
+        Err(ArisError::Missing { place, within, key })
+    };
     let size = match (width, height) {
         (Some(w), Some(h)) => Some((w.whole("width", 1, MAX_SIDE)?, h.whole("height", 1, MAX_SIDE)?)),
         (None, None) => None,
-        (Some(_), None) => {
-            return Err(ArisError::Missing {
-                place: config.place.to_string(),
-                within: "the scene".to_owned(),
-                key: "height",
-            });
-        }
-        (None, Some(_)) => {
-            return Err(ArisError::Missing {
-                place: config.place.to_string(),
-                within: "the scene".to_owned(),
-                key: "width",
-            });
-        }
+        (Some(_), None) => return alone("height"),
+        (None, Some(_)) => return alone("width"),
     };
     scene.cameras.push(Named::new("camera", read_camera(camera, size)?));
     if let Some(environment) = environment {
@@ -72,7 +64,7 @@ pub(super) fn build(
 }
 
 /// The `name` and `config` of an entry.
-fn entry<'a>(node: &'a Node, what: &str) -> Result<(&'a str, Table<'a>), ArisError> {
+pub(super) fn entry<'a>(node: &'a Node, what: &str) -> Result<(&'a str, Table<'a>), ArisError> {
     let mut table = Table::new(node, what)?;
     let name = table.require("name")?.text("name")?;
     // A missing `config` is an empty one.
@@ -86,7 +78,7 @@ fn entry<'a>(node: &'a Node, what: &str) -> Result<(&'a str, Table<'a>), ArisErr
     Ok((name, config))
 }
 
-fn unknown_name(node: &Node, what: &str, name: &str, known: &[&str]) -> ArisError {
+pub(super) fn unknown_name(node: &Node, what: &str, name: &str, known: &[&str]) -> ArisError {
     ArisError::Unsupported {
         place: node.place.to_string(),
         what: format!("{what} {name:?}"),
@@ -140,6 +132,7 @@ fn read_geometry(
                 place: place.clone(),
                 key: key.clone(),
                 cause,
+                hint: String::new(),
             })?;
             let mesh = obj::read_mesh(path, &bytes, warnings).map_err(|cause| ArisError::Mesh {
                 place,
@@ -322,7 +315,7 @@ fn read_disney(
     Ok(ArisDisney { color, scalars })
 }
 
-fn in_range(node: &Node, key: &str, low: f32, high: f32) -> Result<f32, ArisError> {
+pub(super) fn in_range(node: &Node, key: &str, low: f32, high: f32) -> Result<f32, ArisError> {
     let value = node.number(key)?;
     if (low..=high).contains(&value) {
         Ok(value)
@@ -350,7 +343,7 @@ fn reflectance(config: &mut Table<'_>, label: &str) -> Result<Rgb, ArisError> {
 }
 
 /// A colour of at least 0.
-fn radiance(node: &Node, key: &str) -> Result<Rgb, ArisError> {
+pub(super) fn radiance(node: &Node, key: &str) -> Result<Rgb, ArisError> {
     let color: [f32; 3] = node.numbers(key)?;
     match color.iter().find(|c| **c < 0.0) {
         None => Ok(color.into()),
@@ -463,6 +456,7 @@ fn read_environment(
                 place: place.clone(),
                 key: key.to_owned(),
                 cause,
+                hint: String::new(),
             })?;
             let (image, replaced) = decode_image(&bytes, name).map_err(|cause| ArisError::Image {
                 place: place.clone(),

@@ -290,6 +290,88 @@ fn damaged_scenes_never_panic() {
     assert!(read > 20, "{read} of 500 could be read");
 }
 
+/// Random overrides of a small root: composed or refused, and what is composed is read or refused.
+#[test]
+fn odd_overrides_never_panic() {
+    let scene = format!("defaults:\n  - environment: ones\n  - _self_\n{GEOMETRY}{BRDF}{CAMERA}");
+    let root = "defaults:\n  - scene: s\n  - _self_\nspp: 1\nscale: -1\nintegrator: {name: ao}\n";
+    let folder = folder(&[
+        ("config/render.yaml", root.as_bytes()),
+        ("config/scene/s.yaml", scene.as_bytes()),
+        ("config/scene/environment/ones.yaml", b"name: constant\nconfig: {color: [1, 1, 1]}\n"),
+    ]);
+    let pieces = [
+        "+",
+        "++",
+        "~",
+        "scene",
+        "scene/environment",
+        ".brdf",
+        ".0",
+        ".config",
+        ".color",
+        "spp",
+        "scale",
+        "=",
+        "=",
+        "=",
+        "1",
+        "-2",
+        "[",
+        "]",
+        "{",
+        "}",
+        ",",
+        "a",
+        ":",
+        "'",
+        "\"",
+        "\\",
+        "${spp}",
+        "${.x}",
+        "${scene",
+        "null",
+        "ones",
+        "s",
+        " ",
+        "é",
+        "integrator.name",
+        "path",
+    ];
+    let mut state = 1_u32;
+    let mut random = move |below: usize| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as usize % below
+    };
+    let mut composed = 0;
+    for _ in 0..3000 {
+        let length = 1 + random(6);
+        let begin = ["", "spp=", "+x.y=", "scene.brdf.0.config.color=", "++scene.", "scene.camera.config="]
+            [random(6)];
+        let line = begin.to_owned() + &(0..length).map(|_| pieces[random(pieces.len())]).collect::<String>();
+        let Ok(config) = ArisConfig::compose(&folder.path().join("config"), &[line]) else { continue };
+        composed += 1;
+        let _ = (config.import(), config.to_yaml(), config.provenance(), config.output_folder());
+    }
+    assert!(composed > 20, "{composed} of 3000 could be composed");
+}
+
+#[test]
+fn the_names_of_output_folders_are_short_and_their_own() {
+    let folder = folder(&[("config/render.yaml", b"spp: 1\nx: {y: 1}\n")]);
+    let name = |overrides: &[&str]| {
+        let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
+        let config = ArisConfig::compose(&folder.path().join("config"), &overrides).unwrap();
+        config.output_folder().to_str().unwrap().to_owned()
+    };
+    assert_eq!(name(&[]), "outputs/default");
+    assert_eq!(name(&["spp=2", "+x.z=0.5"]), "outputs/spp=2,+x.z=0.5");
+    assert_eq!(name(&["hydra.run.dir=a/b", "spp=2"]), "a/b");
+    let long = |n: usize| name(&[&format!("spp=[{}]", vec!["1.25"; n].join(","))]);
+    assert!(long(100).len() < 140 && long(100) != long(101));
+    assert!(!name(&["spp='../../x'"]).contains("/../"));
+}
+
 #[test]
 fn the_corpus_is_read_as_far_as_its_meshes_are_there() {
     let Some(corpus) = std::env::var_os("PIPELINE_CORPUS") else {

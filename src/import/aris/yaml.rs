@@ -22,13 +22,24 @@ pub(crate) struct Node {
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     pub(crate) file: Arc<str>,
+    /// From 1; 0 for what stands in no file, but as `file` says.
     pub(crate) line: u64,
     pub(crate) column: u64,
 }
 
+impl Place {
+    /// The place of an override of the command line.
+    pub(super) fn of_override(line: &str) -> Self {
+        Self { file: format!("the override `{line}`").into(), line: 0, column: 0 }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.file, self.line, self.column)
+        match self.line {
+            0 => write!(f, "{}", self.file),
+            line => write!(f, "{}:{line}:{}", self.file, self.column),
+        }
     }
 }
 
@@ -37,6 +48,8 @@ impl fmt::Display for Place {
 pub(crate) enum Value {
     Null,
     Bool(bool),
+    /// A number without point or exponent.
+    Whole(i64),
     Number(f64),
     Text(String),
     List(Vec<Node>),
@@ -71,6 +84,7 @@ pub(crate) fn parse(file: &str, bytes: &[u8]) -> Result<Node, ArisError> {
 enum Raw {
     Null,
     Bool(bool),
+    Whole(i64),
     Number(f64),
     Text(String),
     List(Vec<Spanned<Raw>>),
@@ -109,11 +123,11 @@ impl<'de> Visitor<'de> for RawVisitor {
     }
 
     fn visit_i64<E>(self, value: i64) -> Result<Raw, E> {
-        Ok(Raw::Number(value as f64))
+        Ok(Raw::Whole(value))
     }
 
     fn visit_u64<E>(self, value: u64) -> Result<Raw, E> {
-        Ok(Raw::Number(value as f64))
+        Ok(i64::try_from(value).map_or(Raw::Number(value as f64), Raw::Whole))
     }
 
     fn visit_i128<E>(self, value: i128) -> Result<Raw, E> {
@@ -156,6 +170,7 @@ fn located(raw: Spanned<Raw>, file: &Arc<str>) -> Node {
     let value = match raw.value {
         Raw::Null => Value::Null,
         Raw::Bool(value) => Value::Bool(value),
+        Raw::Whole(value) => Value::Whole(value),
         Raw::Number(value) => Value::Number(value),
         Raw::Text(text) => Value::Text(text),
         Raw::List(items) => Value::List(items.into_iter().map(|item| located(item, file)).collect()),
@@ -170,12 +185,21 @@ fn located(raw: Spanned<Raw>, file: &Arc<str>) -> Node {
 }
 
 impl Value {
+    /// Its number, if it is one.
+    fn number(&self) -> Option<f64> {
+        match *self {
+            Self::Whole(value) => Some(value as f64),
+            Self::Number(value) => Some(value),
+            _ => None,
+        }
+    }
+
     /// What it is, for messages.
-    fn kind(&self) -> &'static str {
+    pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::Null => "nothing",
             Self::Bool(_) => "true or false",
-            Self::Number(_) => "a number",
+            Self::Whole(_) | Self::Number(_) => "a number",
             Self::Text(_) => "text",
             Self::List(_) => "a list",
             Self::Map(_) => "a map",
@@ -213,25 +237,29 @@ impl Node {
 
     /// A finite number that fits `f32`.
     pub(super) fn number(&self, key: &str) -> Result<f32, ArisError> {
-        match self.value {
-            Value::Number(value) if (value as f32).is_finite() => Ok(value as f32),
-            Value::Number(value) => Err(self.out_of_range(key, value, "finite")),
-            _ => Err(self.mismatch(key, "a number")),
+        match self.value.number() {
+            Some(value) if (value as f32).is_finite() => Ok(value as f32),
+            Some(value) => Err(self.out_of_range(key, value, "finite")),
+            None => Err(self.mismatch(key, "a number")),
         }
     }
 
     /// A whole number in [low, high].
     pub(super) fn whole(&self, key: &str, low: u32, high: u32) -> Result<u32, ArisError> {
-        match self.value {
-            Value::Number(value)
-                if value.fract() == 0.0 && (f64::from(low)..=f64::from(high)).contains(&value) =>
-            {
+        match self.value.number() {
+            Some(value) if value.fract() == 0.0 && (f64::from(low)..=f64::from(high)).contains(&value) => {
                 Ok(value as u32)
             }
-            Value::Number(value) => {
-                Err(self.out_of_range(key, value, format!("a whole number in [{low}, {high}]")))
-            }
-            _ => Err(self.mismatch(key, "a whole number")),
+            Some(value) => Err(self.out_of_range(key, value, format!("a whole number in [{low}, {high}]"))),
+            None => Err(self.mismatch(key, "a whole number")),
+        }
+    }
+
+    /// `true` or `false`.
+    pub(super) fn flag(&self, key: &str) -> Result<bool, ArisError> {
+        match self.value {
+            Value::Bool(flag) => Ok(flag),
+            _ => Err(self.mismatch(key, "true or false")),
         }
     }
 

@@ -126,9 +126,12 @@ fields! {
         Replicates "replicates": "a whole number in [1, 64]",
         Seed "seed": "a whole number in [0, 9007199254740992]",
         MaxDepth "max_depth": "a whole number in [0, 65535]",
-        Filter "filter": "one of \"box\", \"tent\", \"blackman-harris\"",
+        Filter "filter": "one of \"box\", \"tent\", \"blackman-harris\", \"point\"",
         FilterRadius "filter_radius": "a number of pixels in [0.1, 8]",
         Camera "camera": "the name of one of the scene's cameras",
+        Integrator "integrator": "one of \"path\", \"normals\", \"albedo\", \"diffuse_albedo\", \"depths\", \"ao\", \"whitted\", \"emitter_check\"",
+        Nee "nee": "true or false",
+        Mis "mis": "true or false",
     }
 }
 

@@ -3,7 +3,7 @@
 use super::field::RenderField;
 use super::value::{self, Mismatch};
 use crate::record::Value;
-use crate::settings::{Filter, RenderSettings};
+use crate::settings::{Filter, Integrator, RenderSettings};
 
 /// The largest whole number up to which every one is an `f64`: 2^53.
 pub(super) const MAX_WHOLE: u64 = 1 << 53;
@@ -23,11 +23,15 @@ pub(super) fn set(settings: &mut RenderSettings, field: RenderField, value: &Val
                 "box" => Some(Filter::Box),
                 "tent" => Some(Filter::Tent),
                 "blackman-harris" => Some(Filter::BlackmanHarris),
+                "point" => Some(Filter::Point),
                 _ => None,
             })?;
         }
         RenderField::FilterRadius => settings.filter_radius = Some(value::number(value, 0.1, 8.0)?),
         RenderField::Camera => settings.camera = Some(value::text(value)?.to_owned()),
+        RenderField::Integrator => settings.integrator = value::choice(value, Integrator::from_name)?,
+        RenderField::Nee => settings.nee = value::flag(value)?,
+        RenderField::Mis => settings.mis = value::flag(value)?,
     }
     Ok(())
 }

@@ -159,9 +159,29 @@ fn values_out_of_range_or_of_another_type_say_what_is_taken() {
         ("render.spp", number(0.0)),
         ("render.width", number(1e9)),
         ("render.filter", text("gauss")),
+        ("render.integrator", text("normal")),
+        ("render.integrator", text("point")),
+        ("render.nee", number(0.0)),
     ] {
         assert!(matches!(check_value(path, &value), Err(EditError::Value { .. })), "{path} {value}");
     }
+}
+
+#[test]
+fn every_integrator_that_is_told_to_be_one_is_one() {
+    let Target::Render(field) = Target::parse("render.integrator").unwrap() else { panic!() };
+    let names: Vec<&str> = field.expects().split('"').skip(1).step_by(2).collect();
+    assert_eq!(names.len(), 8);
+    for name in names {
+        let mut settings = RenderSettings::default();
+        set_render(&mut settings, "render.integrator", &text(name)).unwrap();
+        assert_eq!(settings.integrator.name(), name);
+        // As manifests and records write it.
+        assert_eq!(serde_json::to_value(settings.integrator).unwrap(), name);
+    }
+    // Settings that are as usual are left out: keys of jobs do not change with every new one.
+    let usual = serde_json::to_string(&RenderSettings::default()).unwrap();
+    assert!(!usual.contains("integrator") && !usual.contains("mis"), "{usual}");
 }
 
 #[test]

@@ -52,7 +52,22 @@ pub(in crate::manifest) const COMPARE: &[&str] = &[
 
 /// The keys that people look for at the top or in another table.
 pub(in crate::manifest) const HOMES: &[(&str, &[&str])] = &[
-    ("[render]", &["width", "height", "spp", "replicates", "seed", "max_depth", "filter", "filter_radius"]),
+    (
+        "[render]",
+        &[
+            "width",
+            "height",
+            "spp",
+            "replicates",
+            "seed",
+            "max_depth",
+            "filter",
+            "filter_radius",
+            "integrator",
+            "nee",
+            "mis",
+        ],
+    ),
     ("[sheet]", &["columns", "rows", "cell_width"]),
     ("[sheet.display]", DISPLAY),
     ("[compare]", COMPARE),
