@@ -43,6 +43,29 @@ pub enum Value {
     List(Vec<Value>),
 }
 
+impl Value {
+    /// The value of a command line's text, which is written as in TOML; what isn't TOML is text. `None` for tables and dates.
+    pub fn from_text(text: &str) -> Option<Self> {
+        match format!("v = {text}").parse::<toml::Table>() {
+            Ok(mut table) => Self::from_toml(table.remove("v")?),
+            Err(_) => Some(Self::Text(text.to_owned())),
+        }
+    }
+
+    fn from_toml(value: toml::Value) -> Option<Self> {
+        Some(match value {
+            toml::Value::Boolean(b) => Self::Bool(b),
+            toml::Value::Integer(i) => Self::Number(i as f64),
+            toml::Value::Float(f) => Self::Number(f),
+            toml::Value::String(s) => Self::Text(s),
+            toml::Value::Array(items) => {
+                Self::List(items.into_iter().map(Self::from_toml).collect::<Option<_>>()?)
+            }
+            toml::Value::Table(_) | toml::Value::Datetime(_) => return None,
+        })
+    }
+}
+
 impl std::fmt::Display for Value {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {

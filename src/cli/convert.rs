@@ -9,17 +9,17 @@ use super::render::parse_enum;
 use super::{FAILED, Outcome, Talk, WELL, print, tell};
 use crate::convert::ConvertOptions;
 use crate::disney::DiffuseModel;
-use crate::export::{self, Exported, Input, export_library};
+use crate::export::{self, Exported, Input, Target, export};
 use crate::import::ImportOptions;
 
-/// Convert scenes' materials into Disney material libraries, and tell what became of each field.
+/// Convert scenes into Disney material libraries, MaterialX or Aris config roots, and tell what became of each field.
 ///
 /// The library, materials.yaml, is for editing by hand: `pipeline render model.glb --materials materials.yaml` lays it over the scene, and
 /// unedited it gives the same picture. Textures are written beside it. A folder is converted with all scenes inside it, in parallel; a
 /// broken file does not stop the others.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  pipeline convert scenes/shaderball.glb -o outputs/shaderball_materials\n  pipeline convert model.glb --report html > report.html\n  pipeline convert assets/ -o libraries"
+    after_help = "Examples:\n  pipeline convert scenes/shaderball.glb -o outputs/shaderball_materials\n  pipeline convert model.glb --report html > report.html\n  pipeline convert model.glb --to mtlx -o model_mtlx\n  pipeline convert model.glb --to aris -o root && pipeline render root/config spp=16\n  pipeline convert assets/ -o libraries"
 )]
 pub(super) struct Arguments {
     /// Scenes, or folders of scenes.
@@ -28,6 +28,10 @@ pub(super) struct Arguments {
     /// The folder to write into; outputs/convert/NAME where absent.
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
+    /// What to convert into: library, a Disney material library; mtlx, a MaterialX document of disney_principled nodes; aris, a config
+    /// root with meshes, of constants alone.
+    #[arg(long, value_name = "TARGET", value_parser = parse_target, default_value = "library")]
+    to: Target,
     /// How to tell what became of the materials, on stdout.
     #[arg(long, value_enum, default_value_t = Report::Table)]
     report: Report,
@@ -43,10 +47,17 @@ enum Report {
     Html,
 }
 
+fn parse_target(text: &str) -> Result<Target, String> {
+    Target::from_name(text).ok_or_else(|| {
+        let known: Vec<&str> = Target::ALL.iter().map(|t| t.name()).collect();
+        format!("known are {}", known.join(" and "))
+    })
+}
+
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let inputs = export::inputs(&arguments.scenes, &output(arguments))?;
     let options = ConvertOptions { diffuse: arguments.diffuse };
-    let (exported, failed) = convert_all(&inputs, &options, talk);
+    let (exported, failed) = convert_all(&inputs, arguments.to, &options, talk);
     for warning in exported.iter().flat_map(|e| &e.warnings) {
         talk.say(&format!("warning: {warning}"));
     }
@@ -69,7 +80,12 @@ fn output(arguments: &Arguments) -> PathBuf {
 type Failures = Vec<(PathBuf, export::ExportError)>;
 
 /// Converts in parallel; results and failures in the order of the inputs.
-fn convert_all(inputs: &[Input], options: &ConvertOptions, talk: Talk) -> (Vec<Exported>, Failures) {
+fn convert_all(
+    inputs: &[Input],
+    target: Target,
+    options: &ConvertOptions,
+    talk: Talk,
+) -> (Vec<Exported>, Failures) {
     let bar = match (talk, inputs.len()) {
         (Talk::Normal, 2..) => ProgressBar::new(inputs.len() as u64),
         _ => ProgressBar::hidden(),
@@ -81,7 +97,7 @@ fn convert_all(inputs: &[Input], options: &ConvertOptions, talk: Talk) -> (Vec<E
         .par_iter()
         .map(|input| {
             bar.set_message(input.source.display().to_string());
-            let result = export_library(&input.source, &input.folder, &ImportOptions::default(), options);
+            let result = export(&input.source, &input.folder, target, &ImportOptions::default(), options);
             bar.inc(1);
             result.map_err(|error| (input.source.clone(), error))
         })

@@ -110,26 +110,9 @@ fn parse_pixel(text: &str) -> Result<(u32, u32), String> {
 /// `PATH=VALUE`, the value as in TOML; what isn't TOML is text.
 fn parse_override(text: &str) -> Result<Override, String> {
     let (path, value) = text.split_once('=').ok_or_else(|| format!("{text:?} is not PATH=VALUE"))?;
-    let document = format!("v = {}", value.trim());
-    let value = match document.parse::<toml::Table>() {
-        Ok(mut table) => table
-            .remove("v")
-            .and_then(from_toml)
-            .ok_or_else(|| format!("{text:?}: a table or a date is no value"))?,
-        Err(_) => Value::Text(value.trim().to_owned()),
-    };
+    let value =
+        Value::from_text(value.trim()).ok_or_else(|| format!("{text:?}: a table or a date is no value"))?;
     Ok(Override { path: path.trim().to_owned(), value })
-}
-
-fn from_toml(value: toml::Value) -> Option<Value> {
-    Some(match value {
-        toml::Value::Boolean(b) => Value::Bool(b),
-        toml::Value::Integer(i) => Value::Number(i as f64),
-        toml::Value::Float(f) => Value::Number(f),
-        toml::Value::String(s) => Value::Text(s),
-        toml::Value::Array(items) => Value::List(items.into_iter().map(from_toml).collect::<Option<_>>()?),
-        toml::Value::Table(_) | toml::Value::Datetime(_) => return None,
-    })
 }
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {

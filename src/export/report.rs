@@ -38,7 +38,7 @@ fn summary(exported: &Exported) -> String {
     let counts: Vec<String> = counts.collect();
     let counts = if counts.is_empty() { "nothing to tell".to_owned() } else { counts.join(", ") };
     let (materials, textures) = (exported.materials, exported.textures);
-    let file = exported.library.display();
+    let file = exported.file.display();
     format!("{file}: {materials} materials, {textures} textures; fields: {counts}")
 }
 
@@ -58,7 +58,7 @@ pub fn json(exported: &[Exported]) -> serde_json::Value {
                 })
             });
             json!({
-                "scene": e.source, "library": e.library, "materials": e.materials, "textures": e.textures,
+                "scene": e.source, "file": e.file, "materials": e.materials, "textures": e.textures,
                 "notes": notes.collect::<Vec<_>>(),
                 "warnings": e.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
             })
@@ -92,7 +92,7 @@ mod tests {
         };
         Exported {
             source: "model.glb".into(),
-            library: "out/materials.yaml".into(),
+            file: "out/materials.yaml".into(),
             materials: 2,
             textures: 1,
             notes: vec![

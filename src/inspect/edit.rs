@@ -63,21 +63,7 @@ fn value(text: &str) -> Option<Value> {
     if let Ok(number) = text.parse() {
         return Some(Value::Number(number));
     }
-    match format!("v = {text}").parse::<toml::Table>() {
-        Ok(mut table) => from_toml(table.remove("v")?),
-        Err(_) => Some(Value::Text(text.to_owned())),
-    }
-}
-
-fn from_toml(value: toml::Value) -> Option<Value> {
-    Some(match value {
-        toml::Value::Boolean(b) => Value::Bool(b),
-        toml::Value::Integer(i) => Value::Number(i as f64),
-        toml::Value::Float(f) => Value::Number(f),
-        toml::Value::String(s) => Value::Text(s),
-        toml::Value::Array(items) => Value::List(items.into_iter().map(from_toml).collect::<Option<_>>()?),
-        toml::Value::Table(_) | toml::Value::Datetime(_) => return None,
-    })
+    Value::from_text(text)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::color::Rgb;
 use crate::disney::{Alpha, BASE_COLOR, Bsdf, Lobe, Model, Parameter, alpha_from_roughness};
 use crate::math::V3;
 use crate::render::constant_bsdf;
-use crate::scene::material::{Material, Param, TextureChannel, TextureMap};
+use crate::scene::material::{Material, Param, TextureChannel};
 use crate::scene::{Named, Scene, texture::Texel};
 
 /// A material to look into.
@@ -195,7 +195,7 @@ fn constant_color(
         Param::Constant(color) => *color,
         Param::Texture { map, factor } => {
             means.push(name);
-            mean(scene, map).color * *factor
+            scene.mean_texel(map).color * *factor
         }
     }
 }
@@ -211,7 +211,7 @@ fn constant(
         Param::Constant(value) => *value,
         Param::Texture { map, factor } => {
             means.push(name);
-            let Texel { color, alpha } = mean(scene, map);
+            let Texel { color, alpha } = scene.mean_texel(map);
             factor
                 * match map.channel {
                     TextureChannel::R => color.r,
@@ -223,27 +223,12 @@ fn constant(
     }
 }
 
-/// The mean of all texels of a texture, decoded.
-fn mean(scene: &Scene<Material>, map: &TextureMap) -> Texel {
-    let texture = &scene.textures[map.texture.0 as usize];
-    let image = &scene.images[texture.image.0 as usize];
-    let (mut color, mut alpha) = (Rgb::<f64>::BLACK, 0.0);
-    for y in 0..image.height {
-        for x in 0..image.width {
-            let texel = image.texel(x, y, texture.encoding);
-            color += texel.color.cast();
-            alpha += f64::from(texel.alpha);
-        }
-    }
-    let texels = (f64::from(image.width) * f64::from(image.height)).max(1.0);
-    Texel { color: (color / texels).cast(), alpha: (alpha / texels) as f32 }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::scene::material::TextureMap;
     use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
     use crate::scene::{Image, ImageId, Texture, TextureId};
 

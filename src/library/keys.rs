@@ -23,7 +23,7 @@ pub(super) const WRAP: &str = "wrap";
 pub(super) const FILTER: &str = "filter";
 
 /// The key of a scalar, in camelCase as Aris has it.
-pub(super) const fn of(parameter: Parameter) -> &'static str {
+pub const fn of(parameter: Parameter) -> &'static str {
     match parameter {
         Parameter::SpecularTint => "specularTint",
         Parameter::SheenTint => "sheenTint",

@@ -22,10 +22,13 @@ mod overlay;
 mod read;
 #[cfg(test)]
 mod tests;
+mod textures;
 mod write;
 
 pub use field::{field, set};
+pub use keys::of as aris_key;
 pub use read::Library;
+pub use textures::TextureFiles;
 pub use write::{FILE_NAME, Written, write};
 
 use crate::import::{ArisError, EnvironmentError, FileError};

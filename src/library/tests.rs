@@ -100,7 +100,10 @@ fn written_libraries_come_back_to_the_same_materials() {
         let scene = to_disney(imported.scene, &ConvertOptions::default()).scene;
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("textures")).unwrap();
-        let path = write(&scene, file).save(folder.path()).unwrap();
+        let written = write(&scene, file);
+        written.textures.save(folder.path()).unwrap();
+        let path = folder.path().join(FILE_NAME);
+        std::fs::write(&path, &written.text).unwrap();
         let mut laid_over = scene.clone();
         Library::read(&path).unwrap().unwrap().lay_over(&mut laid_over).unwrap();
         for (before, after) in scene.materials.iter().zip(&laid_over.materials) {

@@ -1,27 +1,21 @@
 //! A scene's materials as a library's text, with the images that it names.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
 
-use super::keys;
+use super::{TextureFiles, keys};
 use crate::color::Rgb;
 use crate::disney::{Model, Parameter};
-use crate::imagefile::{ImageFileError, Interleaved, encode_texture, write_whole};
-use crate::manifest::names::plain_name;
+use crate::scene::Scene;
 use crate::scene::material::{Material, Param, TextureChannel, TextureMap};
-use crate::scene::texture::{Image, Pixels, TexelFilter, Wrap};
-use crate::scene::{ImageId, Scene};
-
-/// The folder beside the library that holds its textures.
-const TEXTURES: &str = "textures";
+use crate::scene::texture::{TexelFilter, Wrap};
 
 /// A library's text and its textures.
 #[derive(Clone, Debug)]
 pub struct Written<'a> {
     /// The YAML.
     pub text: String,
-    /// The images that the text names, each with its path relative to the library.
-    pub textures: Vec<(String, &'a Image)>,
+    /// The images that the text names.
+    pub textures: TextureFiles<'a>,
 }
 
 /// The materials of `scene` as a library; `source` is named in its first line.
@@ -29,36 +23,13 @@ pub struct Written<'a> {
 /// Every material says all of its model's own parameters, and what else differs from the default. Numbers are the shortest that read
 /// back to the same bits.
 pub fn write<'a>(scene: &'a Scene<Material>, source: &str) -> Written<'a> {
-    let mut writer = Writer { scene, files: vec![None; scene.images.len()], text: String::new() };
+    let mut writer = Writer { scene, textures: TextureFiles::new(scene), text: String::new() };
     writer.line(0, &format!("# Materials of {source}: change a number and render with --materials FILE."));
     for material in &scene.materials {
         writer.line(0, &format!("{}:", quoted(&material.name)));
         writer.material(&material.item);
     }
-    let named = writer.files.iter().zip(&scene.images);
-    let textures = named.filter_map(|(file, image)| Some((file.clone()?, &**image))).collect();
-    Written { text: writer.text, textures }
-}
-
-impl Written<'_> {
-    /// Writes the library and its textures into `folder`, the text last: where it stands, the textures do. Returns the library's file.
-    ///
-    /// # Errors
-    /// If a texture can't be encoded or a file not written.
-    pub fn save(&self, folder: &Path) -> Result<PathBuf, ImageFileError> {
-        for (file, image) in &self.textures {
-            let pixels = match &image.pixels {
-                Pixels::U8(values) => Interleaved::U8(values),
-                Pixels::U16(values) => Interleaved::U16(values),
-                Pixels::F32(values) => Interleaved::F32(values),
-            };
-            let bytes = encode_texture(image.width, image.height, image.channels, pixels)?;
-            write_whole(&folder.join(file), &bytes)?;
-        }
-        let path = folder.join(FILE_NAME);
-        write_whole(&path, self.text.as_bytes())?;
-        Ok(path)
-    }
+    Written { text: writer.text, textures: writer.textures }
 }
 
 /// What a library's file is called.
@@ -66,8 +37,7 @@ pub const FILE_NAME: &str = "materials.yaml";
 
 struct Writer<'a> {
     scene: &'a Scene<Material>,
-    /// The files of the images that are used, by image.
-    files: Vec<Option<String>>,
+    textures: TextureFiles<'a>,
     text: String,
 }
 
@@ -189,7 +159,7 @@ impl Writer<'_> {
     /// A texture as one parameter uses it, as a map on one line; what is as by default is left out.
     fn map(&mut self, map: &TextureMap, channel: Option<TextureChannel>, factor: Option<String>) -> String {
         let texture = &self.scene.textures[map.texture.0 as usize];
-        let mut text = format!("{{file: {}", quoted(&self.file(texture.image)));
+        let mut text = format!("{{file: {}", quoted(&self.textures.of(texture.image)));
         let mut add = |key: &str, value: &str| {
             let _ = write!(text, ", {key}: {value}");
         };
@@ -216,27 +186,6 @@ impl Writer<'_> {
         }
         text.push('}');
         text
-    }
-
-    /// The file of an image, named after it.
-    fn file(&mut self, image: ImageId) -> String {
-        let index = image.0 as usize;
-        if let Some(file) = &self.files[index] {
-            return file.clone();
-        }
-        let image = &self.scene.images[index];
-        let stem =
-            std::path::Path::new(&image.name).file_stem().map_or("image".into(), |s| s.to_string_lossy());
-        let stem = plain_name(&stem);
-        let extension = if matches!(image.pixels, Pixels::F32(_)) { "exr" } else { "png" };
-        let mut file = format!("{TEXTURES}/{stem}.{extension}");
-        let mut again = 2;
-        while self.files.iter().flatten().any(|f| f.eq_ignore_ascii_case(&file)) {
-            file = format!("{TEXTURES}/{stem}-{again}.{extension}");
-            again += 1;
-        }
-        self.files[index] = Some(file.clone());
-        file
     }
 }
 

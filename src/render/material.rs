@@ -129,7 +129,7 @@ impl PreparedMaterial {
             Emitting::Constant(radiance, sides) => Some((*radiance, *sides)),
             Emitting::Varying(Param::Constant(color), strength, sides) => Some((*color * *strength, *sides)),
             Emitting::Varying(Param::Texture { map, factor }, strength, sides) => {
-                Some((mean_color(scene, map) * *factor * *strength, *sides))
+                Some((scene.mean_texel(map).color * *factor * *strength, *sides))
             }
         }
     }
@@ -320,17 +320,4 @@ fn read_scalar(scene: &Scene, param: &Param<f32>, at: &TrianglePoint<'_>) -> f32
         Param::Constant(value) => *value,
         Param::Texture { map, factor } => factor * map.channel.of(&read_texel(scene, map, at)),
     }
-}
-
-/// The mean of a whole texture; a little above 0 wherever any texel is, so that no light is impossible to choose.
-fn mean_color(scene: &Scene, map: &TextureMap) -> Rgb {
-    let texture = &scene.textures[map.texture.0 as usize];
-    let image = &scene.images[texture.image.0 as usize];
-    let mut sum = Rgb::<f64>::BLACK;
-    for y in 0..image.height {
-        for x in 0..image.width {
-            sum += image.texel(x, y, texture.encoding).color.cast();
-        }
-    }
-    (sum / (f64::from(image.width) * f64::from(image.height)).max(1.0)).cast()
 }

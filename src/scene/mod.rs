@@ -15,6 +15,7 @@ pub mod texture;
 
 use std::sync::Arc;
 
+use crate::color::Rgb;
 use glam::{Affine3A, Vec3};
 
 pub use camera::Camera;
@@ -88,6 +89,22 @@ pub struct Instance {
 }
 
 impl<M> Scene<M> {
+    /// The mean of all texels of a texture, decoded; a little above 0 wherever any texel is.
+    pub fn mean_texel(&self, map: &material::TextureMap) -> texture::Texel {
+        let texture = &self.textures[map.texture.0 as usize];
+        let image = &self.images[texture.image.0 as usize];
+        let (mut color, mut alpha) = (Rgb::<f64>::BLACK, 0.0);
+        for y in 0..image.height {
+            for x in 0..image.width {
+                let texel = image.texel(x, y, texture.encoding);
+                color += texel.color.cast();
+                alpha += f64::from(texel.alpha);
+            }
+        }
+        let texels = (f64::from(image.width) * f64::from(image.height)).max(1.0);
+        texture::Texel { color: (color / texels).cast(), alpha: (alpha / texels) as f32 }
+    }
+
     /// A scene with nothing in it.
     pub fn empty() -> Self {
         Self {

@@ -3,7 +3,8 @@
 use crate::support::{Desk, repository};
 
 /// Each config with the number of its jobs.
-const CONFIGS: [(&str, usize); 5] = [
+const CONFIGS: [(&str, usize); 6] = [
+    ("glass", 16),
     ("pink_and_green_balls", 1),
     ("roughness", 11),
     ("roughness_by_metal", 22),

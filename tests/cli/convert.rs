@@ -1,5 +1,6 @@
 //! `pipeline convert`, and laying its libraries over scenes.
 
+use crate::outside::outside;
 use crate::support::{Desk, SMALL_ARGUMENTS, repository};
 
 fn scene(name: &str) -> String {
@@ -75,4 +76,58 @@ fn a_folder_is_converted_in_one_go_and_a_broken_file_does_not_stop_the_rest() {
         desk.run(["convert", "assets/cornell.obj", "-o", "out", "--report", "html"]).ends_with(0).stdout;
     assert!(page.starts_with("<!doctype html>") && !page.contains("http"));
     desk.run(["convert", "results", "-o", "out"]).ends_with(2);
+}
+
+/// MaterialX's own library knows every node, finds nothing wrong, and generates a shader of each material.
+#[test]
+fn materialx_reads_the_documents() {
+    let Some(python) = outside("PIPELINE_MATERIALX_PYTHON") else { return };
+    let desk = Desk::new("");
+    let mut documents = Vec::new();
+    for (i, file) in ["spheres.glb", "shaderball.glb", "cornell.obj"].into_iter().enumerate() {
+        let folder = format!("mtlx{i}");
+        desk.run(["convert", &scene(file), "--to", "mtlx", "-o", &folder]).ends_with(0).says("fields: ");
+        documents.push(desk.path(&folder).join("materials.mtlx"));
+    }
+    let check = repository("tests/check_mtlx.py");
+    let output =
+        std::process::Command::new(python).arg(check).args(&documents).output().expect("Python starts");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(text.trim(), "7\n7\n6");
+}
+
+/// What Aris can say comes back to the same bits; Hydra composes the root as we do.
+#[test]
+fn an_aris_scene_comes_back_from_a_config_root_to_the_same_picture() {
+    let desk = Desk::new("");
+    let source = scene("aris/config/scene/cbox_balls.yaml");
+    desk.run(["convert", &source, "--to", "aris", "-o", "root"]).ends_with(0);
+    render(&desk, &source, &["-o", "source.exr"]);
+    render(&desk, "root/config", &["-o", "root.exr"]);
+    let picture = |name: &str| desk.raster(name).layers.swap_remove(0).channels;
+    assert_eq!(picture("source.exr"), picture("root.exr"));
+    let Some(python) = outside("PIPELINE_HYDRA_PYTHON") else { return };
+    let code = "import sys, hydra\nwith hydra.initialize_config_dir(version_base=None, config_dir=sys.argv[1]):\n    \
+                c = hydra.compose('render', ['spp=2'])\n    print(c.spp, len(c.scene.brdf), c.scene.camera.config.fov)";
+    let output =
+        std::process::Command::new(python).args(["-c", code]).arg(desk.path("root/config")).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(text.trim(), "2 6 28.0", "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_gltf_scene_renders_from_a_config_root_with_its_losses_told() {
+    let desk = Desk::new("");
+    let source = scene("spheres.glb");
+    let run = desk.run(["convert", &source, "--to", "aris", "-o", "root"]).ends_with(0);
+    run.says("the texture's mean").says("Aris' pixels lie around whole coordinates").says("dropped");
+    render(&desk, "root/config", &["-o", "root.exr"]);
+    render(&desk, &source, &["-o", "source.exr"]);
+    let mean = |name: &str| {
+        let values = desk.raster(name).layers.swap_remove(0).channels.swap_remove(0).values;
+        values.iter().sum::<f32>() / values.len() as f32
+    };
+    let ratio = mean("root.exr") / mean("source.exr");
+    assert!((0.5..1.5).contains(&ratio), "the same scene, but for what was told: {ratio}");
 }

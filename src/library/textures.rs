@@ -1,0 +1,74 @@
+//! The images that a written text names, each in a file of its own beside it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::imagefile::{ImageFileError, Interleaved, encode_texture, write_whole};
+use crate::manifest::names::plain_name;
+use crate::scene::texture::{Image, Pixels};
+use crate::scene::{ImageId, Scene};
+
+/// The folder beside the text that holds them.
+const FOLDER: &str = "textures";
+
+/// The images of a scene with files for those that are used.
+#[derive(Clone, Debug)]
+pub struct TextureFiles<'a> {
+    images: &'a [Arc<Image>],
+    /// By image, relative to the text.
+    files: Vec<Option<String>>,
+}
+
+impl<'a> TextureFiles<'a> {
+    /// Of a scene, none of them used.
+    pub fn new<M>(scene: &'a Scene<M>) -> Self {
+        Self { images: &scene.images, files: vec![None; scene.images.len()] }
+    }
+
+    /// The file of an image, named after it: PNG for integers, EXR for floats. It will be written.
+    pub fn of(&mut self, image: ImageId) -> String {
+        let index = image.0 as usize;
+        if let Some(file) = &self.files[index] {
+            return file.clone();
+        }
+        let image = &self.images[index];
+        let stem = Path::new(&image.name).file_stem().map_or("image".into(), |s| s.to_string_lossy());
+        let stem = plain_name(&stem);
+        let extension = if matches!(image.pixels, Pixels::F32(_)) { "exr" } else { "png" };
+        let mut file = format!("{FOLDER}/{stem}.{extension}");
+        let mut again = 2;
+        while self.files.iter().flatten().any(|f| f.eq_ignore_ascii_case(&file)) {
+            file = format!("{FOLDER}/{stem}-{again}.{extension}");
+            again += 1;
+        }
+        self.files[index] = Some(file.clone());
+        file
+    }
+
+    /// How many are used.
+    pub fn count(&self) -> usize {
+        self.files.iter().flatten().count()
+    }
+
+    /// Writes those that are used into the folder of the text, `folder`; their own folder is made where it is missing.
+    ///
+    /// # Errors
+    /// If an image can't be encoded or a file not written.
+    pub fn save(&self, folder: &Path) -> Result<(), ImageFileError> {
+        if self.count() > 0 {
+            let own = folder.join(FOLDER);
+            std::fs::create_dir_all(&own)
+                .map_err(|cause| ImageFileError::Write { path: own.clone(), cause })?;
+        }
+        for (file, image) in self.files.iter().zip(self.images).filter_map(|(f, i)| Some((f.as_ref()?, i))) {
+            let pixels = match &image.pixels {
+                Pixels::U8(values) => Interleaved::U8(values),
+                Pixels::U16(values) => Interleaved::U16(values),
+                Pixels::F32(values) => Interleaved::F32(values),
+            };
+            let bytes = encode_texture(image.width, image.height, image.channels, pixels)?;
+            write_whole(&folder.join(file), &bytes)?;
+        }
+        Ok(())
+    }
+}
