@@ -259,6 +259,7 @@ impl RootWriter<'_> {
 fn obj(scene: &Scene<Material>, instance: &Instance) -> String {
     let mesh = &scene.meshes[instance.mesh.0 as usize];
     let to_world = instance.world_from_object;
+    let turns = to_world.matrix3 != glam::Mat3A::IDENTITY;
     let normals_to_world = glam::Mat3::from(to_world.matrix3).inverse().transpose();
     let mut text = String::new();
     // Writing to a string can't fail.
@@ -272,7 +273,8 @@ fn obj(scene: &Scene<Material>, instance: &Instance) -> String {
         let _ = writeln!(text, "vt {} {}", uv.x, 1.0 - uv.y);
     }
     for &n in &mesh.normals {
-        let n = (normals_to_world * n).try_normalize().unwrap_or(n);
+        // Not normalised again where nothing turns them: that would move the last bit.
+        let n = if turns { (normals_to_world * n).try_normalize().unwrap_or(n) } else { n };
         let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
     }
     let corner = |c: u32| match (uvs.is_empty(), mesh.normals.is_empty()) {
