@@ -64,6 +64,9 @@ pub(super) struct Arguments {
     /// Read glTF's punctual lights as Blender does: divided by 683.
     #[arg(long)]
     blender_lights: bool,
+    /// The material variant of a glTF file (KHR_materials_variants), by name.
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
     /// The tone curve of a PNG: neutral, srgb or agx.
     #[arg(long, value_name = "CURVE", value_parser = parse_enum::<ToneCurve>, default_value = "neutral")]
     tone: ToneCurve,
@@ -120,6 +123,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     arguments.output.as_deref().map(check_folder).transpose()?;
     let import_options = ImportOptions {
         light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
+        variant: arguments.variant.clone(),
     };
     let loaded =
         job::load(&arguments.scene, &import_options, &ConvertOptions { diffuse: arguments.diffuse })?;

@@ -48,6 +48,9 @@ pub struct Imported {
 pub struct ImportOptions {
     /// The unit that the intensities of glTF's punctual lights are read in.
     pub light_units: LightUnits,
+    /// The variant of glTF's KHR_materials_variants whose materials are taken, by name. None takes the primitives' own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variant: Option<String>,
 }
 
 /// The unit of glTF's punctual lights.
@@ -174,6 +177,9 @@ fn import_with(
             (of_config.scene, of_config.warnings)
         }
     };
+    if dialect != Dialect::Gltf && options.variant.is_some() {
+        warnings.push(Warning::new(name, "material variants are glTF's: the one asked for is of no effect"));
+    }
     validate::validate(&mut scene, name, &mut warnings)
         .map_err(|cause| ImportError::Invalid { path: path.to_owned(), cause })?;
     Ok(Imported { scene, warnings, files: digests.unwrap_or_else(|| files.into_digests()) })

@@ -2,6 +2,7 @@
 //! corpus where it is.
 
 mod corpus;
+mod extensions;
 mod hostile;
 #[path = "../common/outside.rs"]
 mod outside;
@@ -79,7 +80,7 @@ fn nodes_share_meshes_and_mirroring_is_kept() {
 #[test]
 fn lights_shine_along_minus_z_of_their_nodes() {
     let intensity = |light_units| {
-        let options = ImportOptions { light_units };
+        let options = ImportOptions { light_units, ..ImportOptions::default() };
         let scene = import_bytes(Path::new("s.glb"), &sample(), &options).unwrap().scene;
         let LightKind::Directional { direction } = scene.lights[0].item.kind else { panic!() };
         assert!((direction - Vec3::NEG_Y).length() < 1e-6, "{direction}");
@@ -138,11 +139,11 @@ fn what_is_not_shown_is_told() {
         json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}]);
         json["nodes"] = json!([{"mesh": 0, "skin": 0}, {"mesh": 0, "scale": [1, 0, 1]}]);
         json["scenes"][0]["nodes"] = json!([0, 1]);
-        json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+        json["extensionsUsed"] = json!(["EXT_lights_image_based"]);
     });
     let imported = read("a.glb", &bytes).unwrap();
     let all: Vec<String> = imported.warnings.iter().map(ToString::to_string).collect();
-    for part in ["Lines", "morph targets", "skins", "no inverse", "EXT_mesh_gpu_instancing"] {
+    for part in ["Lines", "morph targets", "skins", "no inverse", "EXT_lights_image_based"] {
         assert_eq!(all.iter().filter(|w| w.contains(part)).count(), 1, "{part}: {all:#?}");
     }
     let scene: &Scene<SourceMaterial> = &imported.scene;

@@ -37,6 +37,11 @@ impl<'a> Geometry<'a> {
         Self { accessors, triangles: 0, file }
     }
 
+    /// What reads the file's accessors.
+    pub(super) fn accessors(&self) -> &Accessors<'a> {
+        &self.accessors
+    }
+
     /// The mesh called `name` of the primitive `element`; none, with a warning, if it has no triangles.
     pub(super) fn read(
         &mut self,

@@ -12,15 +12,17 @@ mod buffers;
 mod container;
 mod error;
 mod geometry;
+mod instancing;
 mod material;
 mod nodes;
 mod texture;
 mod uri;
+mod variants;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, DAffine3};
 use gltf::json::Root;
 use gltf::json::mesh::Semantic;
 
@@ -31,13 +33,14 @@ use self::buffers::{Buffers, lookup};
 use self::geometry::{Geometry, VertexAlpha};
 use self::nodes::Placed;
 use self::texture::Textures;
+use self::variants::Variant;
 use crate::import::{Files, ImportOptions};
 use crate::record::Warning;
 use crate::scene::source::{AlphaMode, GltfMaterial, SourceMaterial};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Named, Scene};
 
 /// The most instances that a scene may have.
-const MAX_INSTANCES: u64 = 1 << 24;
+const MAX_INSTANCES: u64 = 1 << 22;
 
 /// The scene in `bytes`, the content of the file called `name`, with what was noticed.
 pub(super) fn import(
@@ -51,10 +54,11 @@ pub(super) fn import(
     let mut warnings = unread_extensions(root, name);
     let buffers = Buffers::load(&document, files)?;
     let placed = nodes::place(root, name, &mut warnings)?;
+    let variant = Variant::choose(root, options.variant.as_deref())?;
 
     let mut scene = Scene::empty();
     let mut textures = Textures::new(root, &buffers, files);
-    let materials = read_materials(root, &mut textures)?;
+    let materials = read_materials(root, variant, &mut textures)?;
     let replaced;
     (scene.textures, scene.images, replaced) = textures.finish();
     warnings.extend(replaced);
@@ -64,6 +68,7 @@ pub(super) fn import(
         root,
         file: name,
         geometry,
+        variant,
         meshes: vec![None; root.meshes.len()],
         materials,
         default_material: None,
@@ -83,7 +88,7 @@ pub(super) fn import(
 /// A warning for each extension that the file uses without requiring it and that is not read. Conversion tells about materials'.
 fn unread_extensions(root: &Root, file: &str) -> Vec<Warning> {
     let used: BTreeSet<&str> = root.extensions_used.iter().map(String::as_str).collect();
-    let of_materials = |e: &str| e.starts_with("KHR_materials_") && e != "KHR_materials_variants";
+    let of_materials = |e: &str| e.starts_with("KHR_materials_");
     used.into_iter()
         .filter(|e| !container::EXTENSIONS.contains(e) && !of_materials(e))
         .map(|e| Warning::new(file, format!("the extension {e} is not read; what it adds is missing")))
@@ -91,12 +96,16 @@ fn unread_extensions(root: &Root, file: &str) -> Vec<Warning> {
 }
 
 /// All materials of the file, named by index where they have no name.
-fn read_materials(root: &Root, textures: &mut Textures) -> Result<Vec<Named<GltfMaterial>>, GltfError> {
+fn read_materials(
+    root: &Root,
+    variant: Variant,
+    textures: &mut Textures,
+) -> Result<Vec<Named<GltfMaterial>>, GltfError> {
+    let mut colored = BTreeSet::new();
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let colored: BTreeSet<usize> = primitives
-        .filter(|p| geometry::attribute(p, Semantic::Colors(0)).is_some())
-        .filter_map(|p| p.material.map(|m| m.value()))
-        .collect();
+    for primitive in primitives.filter(|p| geometry::attribute(p, Semantic::Colors(0)).is_some()) {
+        colored.extend(variant.material(primitive)?);
+    }
     let read = |(index, json): (usize, &gltf::json::Material)| {
         let name = json.name.clone().unwrap_or_else(|| format!("material_{index}"));
         let material = material::read(json, &name, index, colored.contains(&index), textures)?;
@@ -110,6 +119,7 @@ struct Stage<'a> {
     root: &'a Root,
     file: &'a str,
     geometry: Geometry<'a>,
+    variant: Variant,
     /// What became of each mesh of the file: its primitives' meshes and materials.
     meshes: Vec<Option<Vec<(MeshId, MaterialId)>>>,
     materials: Vec<Named<GltfMaterial>>,
@@ -122,7 +132,7 @@ impl Stage<'_> {
     /// Puts what `placed` carries into the scene.
     fn place(&mut self, placed: &Placed, options: &ImportOptions) -> Result<(), GltfError> {
         let element = format!("nodes[{}]", placed.index);
-        if let Some(mesh) = placed.node.mesh {
+        if let Some(mesh) = placed.node.mesh.filter(|_| placed.visible) {
             self.place_mesh(mesh.value(), placed, &element)?;
         }
         if let Some(index) = placed.node.camera {
@@ -133,7 +143,7 @@ impl Stage<'_> {
             self.scene.cameras.push(Named::new(name, camera));
         }
         let extension = placed.node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
-        if let Some(extension) = extension {
+        if let Some(extension) = extension.filter(|_| placed.visible) {
             let lights =
                 self.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map(|e| &e.lights);
             let index = extension.light.value();
@@ -147,25 +157,41 @@ impl Stage<'_> {
     }
 
     fn place_mesh(&mut self, index: usize, placed: &Placed, element: &str) -> Result<(), GltfError> {
-        let m = placed.world_from_node;
-        if m.matrix3.determinant() == 0.0 {
-            let message = "its transform has no inverse (a scale of 0); its mesh is left out";
-            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
-            return Ok(());
-        }
         if placed.node.skin.is_some() {
             let message = "skins are not applied: the mesh is shown as it was bound, where the node stands";
             self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
         }
-        let world_from_object = Affine3A::from_cols_array(&m.to_cols_array().map(|v| v as f32));
-        let parts = self.read_mesh(index, element)?;
-        if self.scene.instances.len() as u64 + parts.len() as u64 > MAX_INSTANCES {
-            return Err(GltfError::TooMany { what: "instances", limit: MAX_INSTANCES });
+        let instances = instancing::transforms(placed.node, element, self.geometry.accessors())?;
+        let instances = instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
+        let count = instances.len();
+        self.check_instances(count)?;
+        let world: Vec<Affine3A> = instances
+            .into_iter()
+            .map(|node_from_object| placed.world_from_node * node_from_object)
+            .filter(|m| m.matrix3.determinant() != 0.0)
+            .map(|m| Affine3A::from_cols_array(&m.to_cols_array().map(|v| v as f32)))
+            .collect();
+        if world.len() < count {
+            let message = "its transform has no inverse (a scale of 0); its mesh is left out";
+            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
         }
-        for (mesh, material) in parts {
-            self.scene.instances.push(Instance { name: placed.name(), mesh, material, world_from_object });
+        let parts = if world.is_empty() { Vec::new() } else { self.read_mesh(index, element)? };
+        self.check_instances(world.len().saturating_mul(parts.len()))?;
+        for world_from_object in world {
+            for &(mesh, material) in &parts {
+                let name = placed.name();
+                self.scene.instances.push(Instance { name, mesh, material, world_from_object });
+            }
         }
         Ok(())
+    }
+
+    /// Whether there may be `more` instances.
+    fn check_instances(&self, more: usize) -> Result<(), GltfError> {
+        match (self.scene.instances.len() as u64).saturating_add(more as u64) {
+            0..=MAX_INSTANCES => Ok(()),
+            _ => Err(GltfError::TooMany { what: "instances", limit: MAX_INSTANCES }),
+        }
     }
 
     /// The meshes and materials of `meshes[index]`, read when it is first asked for.
@@ -181,7 +207,7 @@ impl Stage<'_> {
             let name =
                 if json.primitives.len() == 1 { mesh_name.clone() } else { format!("{mesh_name}/{i}") };
             let colored = geometry::attribute(primitive, Semantic::Colors(0)).is_some();
-            let material = self.material_of(primitive.material.map(|m| m.value()), colored, &element)?;
+            let material = self.material_of(self.variant.material(primitive)?, colored, &element)?;
             let alpha = match self.materials[material.0 as usize].item.alpha_mode {
                 AlphaMode::Opaque => VertexAlpha::Ignore,
                 AlphaMode::Mask { .. } | AlphaMode::Blend => VertexAlpha::Keep,

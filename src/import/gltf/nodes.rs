@@ -26,6 +26,8 @@ pub(super) struct Placed<'a> {
     pub(super) node: &'a Node,
     /// Its own space to the world.
     pub(super) world_from_node: DAffine3,
+    /// Whether its mesh and its light are there (KHR_node_visibility); cameras always are.
+    pub(super) visible: bool,
 }
 
 impl Placed<'_> {
@@ -44,10 +46,13 @@ pub(super) fn place<'a>(
 ) -> Result<Vec<Placed<'a>>, GltfError> {
     let mut visited = vec![false; root.nodes.len()];
     // A stack of our own: the depth of the hierarchy is the file's choice.
-    let mut waiting: Vec<(usize, DAffine3, String)> =
-        roots(root)?.into_iter().rev().map(|(index, element)| (index, DAffine3::IDENTITY, element)).collect();
+    let mut waiting: Vec<(usize, DAffine3, bool, String)> = roots(root)?
+        .into_iter()
+        .rev()
+        .map(|(index, element)| (index, DAffine3::IDENTITY, true, element))
+        .collect();
     let mut placed = Vec::new();
-    while let Some((index, world_from_parent, referrer)) = waiting.pop() {
+    while let Some((index, world_from_parent, parent_visible, referrer)) = waiting.pop() {
         let node = lookup(&root.nodes, index, &referrer, "nodes")?;
         if std::mem::replace(&mut visited[index], true) {
             return Err(GltfError::Tree { node: index });
@@ -56,11 +61,18 @@ pub(super) fn place<'a>(
         if !Affine3A::from_cols_array(&world_from_node.to_cols_array().map(|v| v as f32)).is_finite() {
             return Err(transform_error(index, "a world transform within the range of floats"));
         }
-        placed.push(Placed { index, node, world_from_node });
+        let visible = parent_visible && is_visible(node);
+        placed.push(Placed { index, node, world_from_node, visible });
         let children = node.children.iter().flatten().rev();
-        waiting.extend(children.map(|c| (c.value(), world_from_node, format!("nodes[{index}]"))));
+        waiting.extend(children.map(|c| (c.value(), world_from_node, visible, format!("nodes[{index}]"))));
     }
     Ok(placed)
+}
+
+/// Whether KHR_node_visibility leaves the node visible, its ancestors aside.
+fn is_visible(node: &Node) -> bool {
+    let extension = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
+    extension.and_then(|e| e.get("visible")?.as_bool()).unwrap_or(true)
 }
 
 /// The scene's own nodes, each with what refers to it.
