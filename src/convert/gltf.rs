@@ -167,7 +167,20 @@ fn opacity(source: &GltfMaterial, notes: &mut Notes) -> Opacity {
 
 fn note_unread(source: &GltfMaterial, notes: &mut Notes) {
     for name in &source.unread {
-        notes.add(name, Quality::Dropped, "not read");
+        let reason = match name.as_str() {
+            "KHR_materials_dispersion" => "all wavelengths are bent alike",
+            "KHR_materials_iridescence" => "Disney's lobes have no thin film",
+            _ => "not read",
+        };
+        notes.add(name, Quality::Dropped, reason);
+    }
+    if source.specular_glossiness {
+        let mut reason =
+            "metallic and base colour by Khronos' solveMetallic; F0 of a dielectric is 0.04".to_owned();
+        if source.metallic_roughness_texture.is_some() {
+            reason.push_str("; textures are converted texel by texel, to 8 bits");
+        }
+        notes.add("KHR_materials_pbrSpecularGlossiness", Quality::Approximated, &reason);
     }
 }
 

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use glam::Vec3;
 use pipeline::import::{GltfError, ImportError, ImportOptions, Imported, import_bytes};
+use pipeline::scene::source::SourceMaterial;
+use pipeline::scene::texture::Pixels;
 use serde_json::{Value, json};
 
 use crate::sample::{Bin, error_of, minimal, read};
@@ -132,4 +134,50 @@ fn hidden_nodes_hide_what_is_below_them_but_cameras() {
     let scene = read("h.glb", &bytes).unwrap().scene;
     let names: Vec<&str> = scene.instances.iter().map(|i| i.name.as_str()).collect();
     assert_eq!((names, scene.cameras.len()), (vec!["seen"], 1));
+}
+
+/// A square of one material with KHR_materials_pbrSpecularGlossiness, and the image 2 × 1 of a black and a white half.
+fn specular_glossiness(extension: Value) -> Vec<u8> {
+    minimal(|json, bin| {
+        let mut png = Vec::new();
+        let image = image::RgbaImage::from_raw(2, 1, vec![0, 0, 0, 255, 255, 255, 255, 51]).unwrap();
+        image.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+        let png = bin.view(&png);
+        json["images"] = json!([{"bufferView": png, "mimeType": "image/png"}]);
+        json["textures"] = json!([{"source": 0}]);
+        json["extensionsRequired"] = json!(["KHR_materials_pbrSpecularGlossiness"]);
+        json["materials"] = json!([{"extensions": {"KHR_materials_pbrSpecularGlossiness": extension}}]);
+        json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    })
+}
+
+#[test]
+fn specular_and_glossiness_become_metallic_and_roughness() {
+    let gltf = |extension| {
+        let scene = read("s.glb", &specular_glossiness(extension)).unwrap().scene;
+        let SourceMaterial::Gltf(material) = scene.materials[0].item.clone() else { panic!() };
+        (material, scene)
+    };
+    let (metal, _) = gltf(json!({"diffuseFactor": [0, 0, 0, 0.5], "glossinessFactor": 0.75}));
+    assert_eq!((metal.metallic_factor, metal.roughness_factor, metal.alpha_factor), (1.0, 0.25, 0.5));
+    assert!(metal.specular_glossiness && metal.base_color_texture.is_none());
+
+    let (textured, scene) =
+        gltf(json!({"diffuseFactor": [0, 0, 0, 1], "specularGlossinessTexture": {"index": 0}}));
+    let map = textured.metallic_roughness_texture.unwrap();
+    let pixels = &scene.images[scene.textures[map.texture.0 as usize].image.0 as usize].pixels;
+    // Black is a smooth dielectric; white a metal of glossiness 0.2.
+    assert_eq!(*pixels, Pixels::U8(vec![0, 0, 0, 0, 204, 255]));
+    assert!(textured.base_color_texture.is_some());
+
+    let turned = json!({"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}});
+    let (apart, _) = gltf(json!({"diffuseTexture": turned, "specularGlossinessTexture": {"index": 0}}));
+    assert_ne!(
+        apart.base_color_texture.unwrap().texture_from_uv,
+        apart.metallic_roughness_texture.unwrap().texture_from_uv
+    );
+    let error = error_of(&specular_glossiness(json!({"glossinessFactor": 2})));
+    assert!(matches!(error, GltfError::Factor { field: "glossinessFactor", .. }), "{error}");
+    let error = error_of(&specular_glossiness(json!({"diffuseTexture": {"index": 7}})));
+    assert!(matches!(error, GltfError::Reference { .. }), "{error}");
 }

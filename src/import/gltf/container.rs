@@ -4,15 +4,18 @@ use gltf::json::{Root, Value};
 
 use super::error::GltfError;
 
-/// The extensions that are read. A file that requires another one is refused.
+/// The extensions that are read, or dropped with a note. A file that requires another one is refused.
 pub(super) const EXTENSIONS: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",

@@ -15,6 +15,7 @@ mod geometry;
 mod instancing;
 mod material;
 mod nodes;
+mod specular_glossiness;
 mod texture;
 mod uri;
 mod variants;

@@ -56,6 +56,8 @@ pub struct GltfMaterial {
     pub diffuse_transmission: Option<GltfDiffuseTransmission>,
     /// KHR_materials_unlit: the surface shows its base colour whatever the light.
     pub unlit: bool,
+    /// Whether base colour, metallic and roughness were computed from KHR_materials_pbrSpecularGlossiness.
+    pub specular_glossiness: bool,
     /// What the file says about the material that is not read: extensions and textures of extensions, by name.
     pub unread: Vec<String>,
 }
@@ -174,6 +176,7 @@ impl Default for GltfMaterial {
             volume: None,
             diffuse_transmission: None,
             unlit: false,
+            specular_glossiness: false,
             unread: Vec::new(),
         }
     }
