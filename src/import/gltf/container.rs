@@ -2,6 +2,7 @@
 
 use gltf::json::{Root, Value};
 
+use super::animation::NO_NODE;
 use super::error::GltfError;
 
 /// The extensions that are read, or dropped with a note. A file that requires another one is refused.
@@ -108,7 +109,7 @@ fn check_extensions(json: &Value) -> Result<(), GltfError> {
     Ok(())
 }
 
-/// Makes up for what the `gltf` crate's JSON types get wrong: a scene without nodes is legal, and an index beyond 2³² - 1 must not
+/// Makes up for what the `gltf` crate's JSON types get wrong: a scene without nodes is legal, so is a channel without one, and an index beyond 2³² - 1 must not
 /// wrap around to a small one.
 fn prepare(json: &mut Value) {
     for scene in json.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
@@ -116,11 +117,22 @@ fn prepare(json: &mut Value) {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
         }
     }
+    // A channel whose target an extension names has no node.
+    for animation in json.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten() {
+        for channel in animation.get_mut("channels").and_then(Value::as_array_mut).into_iter().flatten() {
+            if let Some(target) = channel.get_mut("target").and_then(Value::as_object_mut) {
+                target.entry("node").or_insert(Value::from(NO_NODE));
+            }
+        }
+    }
     saturate_indices(json, None);
 }
 
 /// The properties that the crate truncates to 32 bits.
-const TRUNCATED: [&str; 21] = [
+const TRUNCATED: [&str; 28] = [
+    "NORMAL",
+    "POSITION",
+    "TANGENT",
     "attributes",
     "buffer",
     "bufferView",
@@ -129,6 +141,8 @@ const TRUNCATED: [&str; 21] = [
     "componentType",
     "index",
     "indices",
+    "input",
+    "inverseBindMatrices",
     "joints",
     "light",
     "magFilter",
@@ -136,7 +150,9 @@ const TRUNCATED: [&str; 21] = [
     "mesh",
     "minFilter",
     "mode",
+    "node",
     "nodes",
+    "output",
     "sampler",
     "scene",
     "skin",

@@ -8,8 +8,10 @@
 //! `nodes` make the parts of the scene, and this file puts them together.
 
 mod accessor;
+mod animation;
 mod buffers;
 mod container;
+mod deform;
 mod error;
 mod geometry;
 mod instancing;
@@ -20,7 +22,7 @@ mod texture;
 mod uri;
 mod variants;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::{Affine3A, DAffine3};
@@ -30,8 +32,10 @@ use gltf::json::mesh::Semantic;
 pub use error::{GltfError, UriProblem};
 
 use self::accessor::Accessors;
+use self::animation::Pose;
 use self::buffers::{Buffers, lookup};
-use self::geometry::{Geometry, VertexAlpha};
+use self::deform::Deformation;
+use self::geometry::{Geometry, Part, VertexAlpha};
 use self::nodes::Placed;
 use self::texture::Textures;
 use self::variants::Variant;
@@ -54,7 +58,9 @@ pub(super) fn import(
     let root = &document.root;
     let mut warnings = unread_extensions(root, name);
     let buffers = Buffers::load(&document, files)?;
-    let placed = nodes::place(root, name, &mut warnings)?;
+    let accessors = Accessors::new(root, &buffers);
+    let pose = Pose::sample(root, &accessors, options, name, &mut warnings)?;
+    let placed = nodes::place(root, &pose, name, &mut warnings)?;
     let variant = Variant::choose(root, options.variant.as_deref())?;
 
     let mut scene = Scene::empty();
@@ -64,13 +70,19 @@ pub(super) fn import(
     (scene.textures, scene.images, replaced) = textures.finish();
     warnings.extend(replaced);
 
-    let geometry = Geometry::new(Accessors::new(root, &buffers), name);
+    let geometry = Geometry::new(accessors, name);
+    let mut worlds = vec![None; root.nodes.len()];
+    for placed in &placed {
+        worlds[placed.index] = Some(placed.world_from_node);
+    }
     let mut stage = Stage {
         root,
+        pose,
+        worlds,
         file: name,
         geometry,
         variant,
-        meshes: vec![None; root.meshes.len()],
+        meshes: BTreeMap::new(),
         materials,
         default_material: None,
         scene,
@@ -121,8 +133,11 @@ struct Stage<'a> {
     file: &'a str,
     geometry: Geometry<'a>,
     variant: Variant,
-    /// What became of each mesh of the file: its primitives' meshes and materials.
-    meshes: Vec<Option<Vec<(MeshId, MaterialId)>>>,
+    pose: Pose,
+    /// Where each node of the file stands, if the scene has it.
+    worlds: Vec<Option<DAffine3>>,
+    /// What became of each mesh of the file, for itself or for a node that deforms it: its primitives' meshes and materials.
+    meshes: BTreeMap<(usize, Option<usize>), Vec<(MeshId, MaterialId)>>,
     materials: Vec<Named<GltfMaterial>>,
     default_material: Option<MaterialId>,
     scene: Scene<SourceMaterial>,
@@ -158,10 +173,29 @@ impl Stage<'_> {
     }
 
     fn place_mesh(&mut self, index: usize, placed: &Placed, element: &str) -> Result<(), GltfError> {
-        if placed.node.skin.is_some() {
-            let message = "skins are not applied: the mesh is shown as it was bound, where the node stands";
-            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
+        let (deformer, deformation) = self.deformation(index, placed, element)?;
+        let world = match deformation.joints {
+            // The joints alone say where a skinned mesh stands.
+            Some(_) => vec![Affine3A::IDENTITY],
+            None => self.instances(placed, element)?,
+        };
+        let parts = if world.is_empty() {
+            Vec::new()
+        } else {
+            self.read_mesh(index, deformer, &deformation, element)?
+        };
+        self.check_instances(world.len().saturating_mul(parts.len()))?;
+        for world_from_object in world {
+            for &(mesh, material) in &parts {
+                let name = placed.name();
+                self.scene.instances.push(Instance { name, mesh, material, world_from_object });
+            }
         }
+        Ok(())
+    }
+
+    /// Where the node's mesh stands: once, or as EXT_mesh_gpu_instancing says.
+    fn instances(&mut self, placed: &Placed, element: &str) -> Result<Vec<Affine3A>, GltfError> {
         let instances = instancing::transforms(placed.node, element, self.geometry.accessors())?;
         let instances = instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
         let count = instances.len();
@@ -176,15 +210,7 @@ impl Stage<'_> {
             let message = "its transform has no inverse (a scale of 0); its mesh is left out";
             self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
         }
-        let parts = if world.is_empty() { Vec::new() } else { self.read_mesh(index, element)? };
-        self.check_instances(world.len().saturating_mul(parts.len()))?;
-        for world_from_object in world {
-            for &(mesh, material) in &parts {
-                let name = placed.name();
-                self.scene.instances.push(Instance { name, mesh, material, world_from_object });
-            }
-        }
-        Ok(())
+        Ok(world)
     }
 
     /// Whether there may be `more` instances.
@@ -195,10 +221,38 @@ impl Stage<'_> {
         }
     }
 
-    /// The meshes and materials of `meshes[index]`, read when it is first asked for.
-    fn read_mesh(&mut self, index: usize, element: &str) -> Result<Vec<(MeshId, MaterialId)>, GltfError> {
+    /// How the node `placed` deforms `meshes[index]`, and the node's index if the mesh is not as other nodes show it.
+    fn deformation(
+        &self,
+        index: usize,
+        placed: &Placed,
+        element: &str,
+    ) -> Result<(Option<usize>, Deformation), GltfError> {
+        let mesh = lookup(&self.root.meshes, index, element, "meshes")?;
+        let posed = self.pose.of(placed.index).and_then(|pose| pose.weights.as_ref());
+        let own = posed.or(placed.node.weights.as_ref());
+        let weights = own.or(mesh.weights.as_ref()).cloned().unwrap_or_default();
+        let joints = match placed.node.skin {
+            Some(skin) => {
+                let accessors = self.geometry.accessors();
+                Some(deform::joints(self.root, skin.value(), element, &self.worlds, accessors)?)
+            }
+            None => None,
+        };
+        let deformer = (own.is_some() || joints.is_some()).then_some(placed.index);
+        Ok((deformer, Deformation { weights, joints }))
+    }
+
+    /// The meshes and materials of `meshes[index]` as `deformation` moves it, read when it is first asked for.
+    fn read_mesh(
+        &mut self,
+        index: usize,
+        deformer: Option<usize>,
+        deformation: &Deformation,
+        element: &str,
+    ) -> Result<Vec<(MeshId, MaterialId)>, GltfError> {
         let json = lookup(&self.root.meshes, index, element, "meshes")?;
-        if let Some(parts) = &self.meshes[index] {
+        if let Some(parts) = self.meshes.get(&(index, deformer)) {
             return Ok(parts.clone());
         }
         let mesh_name = json.name.clone().unwrap_or_else(|| format!("mesh_{index}"));
@@ -213,14 +267,15 @@ impl Stage<'_> {
                 AlphaMode::Opaque => VertexAlpha::Ignore,
                 AlphaMode::Mask { .. } | AlphaMode::Blend => VertexAlpha::Keep,
             };
-            let mesh = self.geometry.read(primitive, &element, name, alpha, &mut self.warnings)?;
+            let part = Part { primitive, element: &element, name, alpha, deformation };
+            let mesh = self.geometry.read(part, &mut self.warnings)?;
             if let Some(mesh) = mesh {
                 let id = MeshId(self.scene.meshes.len() as u32);
                 self.scene.meshes.push(mesh);
                 parts.push((id, material));
             }
         }
-        self.meshes[index] = Some(parts.clone());
+        self.meshes.insert((index, deformer), parts.clone());
         Ok(parts)
     }
 

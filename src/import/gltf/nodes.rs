@@ -7,6 +7,7 @@ use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
+use super::animation::{NodePose, Pose};
 use super::buffers::lookup;
 use super::error::GltfError;
 use crate::import::{ImportOptions, LightUnits};
@@ -38,9 +39,10 @@ impl Placed<'_> {
 }
 
 /// All nodes of the default scene (the first if none is), parents before children, in the file's order. A file without scenes is
-/// taken as one scene of all nodes without parents.
+/// taken as one scene of all nodes without parents. An animation's `pose` moves them.
 pub(super) fn place<'a>(
     root: &'a Root,
+    pose: &Pose,
     file: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<Placed<'a>>, GltfError> {
@@ -57,7 +59,8 @@ pub(super) fn place<'a>(
         if std::mem::replace(&mut visited[index], true) {
             return Err(GltfError::Tree { node: index });
         }
-        let world_from_node = world_from_parent * local_transform(node, index, file, warnings)?;
+        let world_from_node =
+            world_from_parent * local_transform(node, index, pose.of(index), file, warnings)?;
         if !Affine3A::from_cols_array(&world_from_node.to_cols_array().map(|v| v as f32)).is_finite() {
             return Err(transform_error(index, "a world transform within the range of floats"));
         }
@@ -96,10 +99,11 @@ fn transform_error(index: usize, expected: &'static str) -> GltfError {
     GltfError::Invalid { element: format!("nodes[{index}]"), property: "transform", expected }
 }
 
-/// The transform of a node in its parent: its matrix, or T·R·S.
+/// The transform of a node in its parent: its matrix, or T·R·S, each as the pose says or else the node.
 fn local_transform(
     node: &Node,
     index: usize,
+    pose: Option<&NodePose>,
     file: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<DAffine3, GltfError> {
@@ -115,12 +119,12 @@ fn local_transform(
         return Ok(DAffine3::from_mat4(matrix));
     }
     let vector = |v: Option<[f32; 3]>, default| v.map_or(default, |v| Vec3::from(v).as_dvec3());
-    let scale = vector(node.scale, DVec3::ONE);
-    let translation = vector(node.translation, DVec3::ZERO);
-    let rotation = match node.rotation {
+    let scale = vector(pose.and_then(|p| p.scale).or(node.scale), DVec3::ONE);
+    let translation = vector(pose.and_then(|p| p.translation).or(node.translation), DVec3::ZERO);
+    let rotation = match pose.and_then(|p| p.rotation).or(node.rotation.map(|q| q.0)) {
         None => DQuat::IDENTITY,
         Some(q) => {
-            let q = DQuat::from_array(q.0.map(f64::from));
+            let q = DQuat::from_array(q.map(f64::from));
             let length = q.length();
             if !length.is_finite() || length == 0.0 {
                 return Err(transform_error(index, "a rotation that is a unit quaternion"));
