@@ -87,8 +87,8 @@ pub(super) fn convert(
     convert_emission(source, &mut material, &mut notes);
     if let Some(map) = &source.normal_texture {
         material.normal_map = Some(NormalMap { map: map.clone(), scale: source.normal_scale });
-        let reason = "with the mesh's tangents; without them the frame follows the texture coordinates, which is \
-                      MikkTSpace's up to its smoothing";
+        let reason =
+            "with the mesh's tangents or MikkTSpace's; a mesh without normals has the triangles' own";
         notes.add("normalTexture", Quality::Exact, reason);
     }
     if source.occlusion {

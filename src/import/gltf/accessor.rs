@@ -47,6 +47,11 @@ impl<'a> Accessors<'a> {
         Ok(lookup(&self.root.accessors, index, element, "accessors")?.buffer_view.is_some())
     }
 
+    /// The number of elements that `accessors[index]` says it has; 0 if it isn't there.
+    pub(super) fn count(&self, index: usize) -> usize {
+        self.root.accessors.get(index).map_or(0, |a| usize::try_from(a.count.0).unwrap_or(usize::MAX))
+    }
+
     /// `accessors[index]` as vectors of N floats, which `element` asks for. Normalised integers become [0, 1] or [-1, 1].
     pub(super) fn floats<const N: usize>(
         &self,
@@ -104,7 +109,7 @@ impl<'a> Accessors<'a> {
     ) -> Result<Vec<T>, GltfError> {
         let name = format!("accessors[{index}]");
         let count = accessor.count.0;
-        self.count(count)?;
+        self.charge(count)?;
         let size = component.size() * components;
         let mut elements = match accessor.buffer_view {
             Some(view) => {
@@ -206,7 +211,7 @@ impl<'a> Accessors<'a> {
     }
 
     /// Counts what is read: a small file may ask for the same elements again and again.
-    fn count(&self, elements: u64) -> Result<(), GltfError> {
+    fn charge(&self, elements: u64) -> Result<(), GltfError> {
         self.read.set(self.read.get().saturating_add(elements));
         if self.read.get() > MAX_ELEMENTS {
             return Err(GltfError::TooMany { what: "elements of accessors", limit: MAX_ELEMENTS });

@@ -103,24 +103,26 @@ impl Deformation {
         Ok(())
     }
 
-    /// Moves the vertices of `mesh` into the world by the joints they hang on, if there is a skin. What was amiss with how many
-    /// of them is told to `warn`.
+    /// Moves the vertices of `mesh` into the world by the joints they hang on, if there is a skin. `source` says which vertices of
+    /// the file they are, if they are not the same; what was amiss with how many of them is told to `warn`.
     pub(super) fn skin(
         &self,
         primitive: &Primitive,
         element: &str,
         accessors: &Accessors,
+        source: Option<&[u32]>,
         mesh: &mut Mesh,
         warn: &mut impl FnMut(String),
     ) -> Result<(), GltfError> {
         let Some(joints) = &self.joints else { return Ok(()) };
-        let vertices = mesh.positions.len();
+        let position = attribute(primitive, Semantic::Positions);
         let mut influences = Vec::new();
         let mut set = 0;
         while let (Some(j), Some(w)) =
             (attribute(primitive, Semantic::Joints(set)), attribute(primitive, Semantic::Weights(set)))
         {
             let pair = (accessors.floats::<4>(j, element)?, accessors.floats::<4>(w, element)?);
+            let vertices = position.map_or(0, |p| accessors.count(p));
             for (name, found) in [("JOINTS", pair.0.len()), ("WEIGHTS", pair.1.len())] {
                 if found != vertices {
                     let (element, attribute) = (element.to_owned(), format!("{name}_{set}"));
@@ -138,11 +140,12 @@ impl Deformation {
         }
 
         let (mut unbound, mut mirrored) = (0, 0);
-        for v in 0..vertices {
+        for v in 0..mesh.positions.len() {
+            let vertex = source.map_or(v, |source| source[v] as usize);
             let mut total = 0.0;
             let mut blend = [DVec3::ZERO; 4];
             for (set_joints, set_weights) in &influences {
-                for (&joint, &weight) in set_joints[v].iter().zip(&set_weights[v]) {
+                for (&joint, &weight) in set_joints[vertex].iter().zip(&set_weights[vertex]) {
                     // Exporters leave rubbish where the weight is 0.
                     if !(weight > 0.0 && weight.is_finite()) {
                         continue;
@@ -182,7 +185,7 @@ impl Deformation {
         if unbound > 0 && !influences.is_empty() {
             warn(format!("{unbound} vertices have no positive weight and hang on the first joint"));
         }
-        if mirrored * 2 > vertices {
+        if mirrored * 2 > mesh.positions.len() {
             for t in &mut mesh.triangles {
                 t.swap(1, 2);
             }

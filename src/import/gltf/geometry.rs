@@ -9,6 +9,7 @@ use gltf::json::validation::Checked;
 use super::accessor::Accessors;
 use super::deform::Deformation;
 use super::error::GltfError;
+use super::tangents;
 use crate::import::validate::compact;
 use crate::record::Warning;
 use crate::scene::Mesh;
@@ -35,6 +36,8 @@ pub(super) struct Part<'p> {
     pub(super) name: String,
     /// What becomes of its vertex colours' alpha.
     pub(super) alpha: VertexAlpha,
+    /// The texture coordinates that its tangents follow, if its material needs any.
+    pub(super) tangents: Option<u32>,
     /// How its vertices are moved.
     pub(super) deformation: &'p Deformation,
 }
@@ -63,7 +66,7 @@ impl<'a> Geometry<'a> {
         part: Part,
         warnings: &mut Vec<Warning>,
     ) -> Result<Option<Arc<Mesh>>, GltfError> {
-        let Part { primitive, element, name, alpha, deformation } = part;
+        let Part { primitive, element, name, alpha, tangents: tangent_set, deformation } = part;
         let file = self.file;
         let mut warn = |message: String| {
             warnings.push(Warning::new(format!("{file}: mesh {name:?} ({element})"), message));
@@ -108,7 +111,9 @@ impl<'a> Geometry<'a> {
         self.count(mesh.triangles.len())?;
         self.read_attributes(primitive, element, alpha, &mut mesh, &mut warn)?;
         deformation.morph(primitive, element, &self.accessors, &mut mesh)?;
-        deformation.skin(primitive, element, &self.accessors, &mut mesh, &mut warn)?;
+        let set = tangent_set.filter(|_| mesh.tangents.is_empty());
+        let split = set.and_then(|set| tangents::generate(&mut mesh, set as usize));
+        deformation.skin(primitive, element, &self.accessors, split.as_deref(), &mut mesh, &mut warn)?;
         mesh.name = name;
         compact(&mut mesh);
         Ok(Some(Arc::new(mesh)))

@@ -18,6 +18,7 @@ mod instancing;
 mod material;
 mod nodes;
 mod specular_glossiness;
+mod tangents;
 mod texture;
 mod uri;
 mod variants;
@@ -263,11 +264,13 @@ impl Stage<'_> {
                 if json.primitives.len() == 1 { mesh_name.clone() } else { format!("{mesh_name}/{i}") };
             let colored = geometry::attribute(primitive, Semantic::Colors(0)).is_some();
             let material = self.material_of(self.variant.material(primitive)?, colored, &element)?;
-            let alpha = match self.materials[material.0 as usize].item.alpha_mode {
+            let source = &self.materials[material.0 as usize].item;
+            let tangents = source.tangent_set();
+            let alpha = match source.alpha_mode {
                 AlphaMode::Opaque => VertexAlpha::Ignore,
                 AlphaMode::Mask { .. } | AlphaMode::Blend => VertexAlpha::Keep,
             };
-            let part = Part { primitive, element: &element, name, alpha, deformation };
+            let part = Part { primitive, element: &element, name, alpha, tangents, deformation };
             let mesh = self.geometry.read(part, &mut self.warnings)?;
             if let Some(mesh) = mesh {
                 let id = MeshId(self.scene.meshes.len() as u32);

@@ -183,6 +183,12 @@ impl Default for GltfMaterial {
 }
 
 impl GltfMaterial {
+    /// The set of texture coordinates that the surface's tangents follow, if the material depends on them.
+    pub fn tangent_set(&self) -> Option<u32> {
+        let normal = self.normal_texture.as_ref().map(|map| map.uv_set);
+        normal.or_else(|| self.anisotropy.map(|_| 0))
+    }
+
     /// Every texture that is read, with the field it stands in.
     pub fn textures(&self) -> impl Iterator<Item = (&'static str, &TextureMap)> {
         let coat = self.clearcoat.as_ref().and_then(|c| c.texture.as_ref());
