@@ -1,4 +1,4 @@
-//! PNG, JPEG and Radiance HDR, through the `image` crate.
+//! PNG, JPEG, WebP and Radiance HDR, through the `image` crate.
 
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,6 +7,7 @@ use std::path::Path;
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::{PngDecoder, PngEncoder};
+use image::codecs::webp::WebPDecoder;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, Limits};
 
 use crate::raster::{Channel, Layer, Raster, SampleType, Window};
@@ -43,6 +44,7 @@ fn decode_dynamic(bytes: &[u8], format: Format, name: &str) -> Result<DynamicIma
     match format {
         Format::Png => finish(PngDecoder::with_limits(input, limits()).map_err(about)?, name),
         Format::Jpeg => finish(JpegDecoder::new(input).map_err(about)?, name),
+        Format::WebP => finish(WebPDecoder::new(input).map_err(about)?, name),
         Format::Hdr => finish(HdrDecoder::new(input).map_err(about)?, name),
         Format::Exr => Err(damaged(name, "an EXR came to the wrong decoder")),
     }

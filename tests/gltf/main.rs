@@ -2,6 +2,7 @@
 //! corpus where it is.
 
 mod animation;
+mod compressed;
 mod corpus;
 mod extensions;
 mod hostile;

@@ -42,11 +42,6 @@ impl<'a> Accessors<'a> {
         Ok(type_of(accessor, index)?.multiplicity())
     }
 
-    /// Whether `accessors[index]` has bytes of its own, apart from sparse ones.
-    pub(super) fn has_data(&self, index: usize, element: &str) -> Result<bool, GltfError> {
-        Ok(lookup(&self.root.accessors, index, element, "accessors")?.buffer_view.is_some())
-    }
-
     /// The number of elements that `accessors[index]` says it has; 0 if it isn't there.
     pub(super) fn count(&self, index: usize) -> usize {
         self.root.accessors.get(index).map_or(0, |a| usize::try_from(a.count.0).unwrap_or(usize::MAX))

@@ -8,6 +8,9 @@ use super::error::GltfError;
 /// The extensions that are read, or dropped with a note. A file that requires another one is refused.
 pub(super) const EXTENSIONS: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -192,9 +195,8 @@ mod tests {
     #[test]
     fn required_extensions_come_before_anything_else() {
         // The rest of the file is nonsense.
-        let error =
-            root(r#"{"extensionsRequired": ["KHR_draco_mesh_compression"], "meshes": 3}"#).unwrap_err();
-        assert!(error.to_string().contains("KHR_draco_mesh_compression"), "{error}");
+        let error = root(r#"{"extensionsRequired": ["VENDOR_compression"], "meshes": 3}"#).unwrap_err();
+        assert!(error.to_string().contains("requires the extension VENDOR_compression"), "{error}");
     }
 
     #[test]

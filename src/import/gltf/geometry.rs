@@ -15,7 +15,7 @@ use crate::record::Warning;
 use crate::scene::Mesh;
 
 /// The most triangles that all meshes of a file may have together.
-const MAX_TRIANGLES: u64 = 1 << 27;
+pub(super) const MAX_TRIANGLES: u64 = 1 << 27;
 
 /// What becomes of the alpha of vertex colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,17 +71,10 @@ impl<'a> Geometry<'a> {
         let mut warn = |message: String| {
             warnings.push(Warning::new(format!("{file}: mesh {name:?} ({element})"), message));
         };
-        let others = primitive.extensions.as_ref().map(|e| &e.others);
         let Some(positions) = attribute(primitive, Semantic::Positions) else {
             warn("it has no POSITION and is left out".into());
             return Ok(None);
         };
-        if others.is_some_and(|o| o.contains_key("KHR_draco_mesh_compression"))
-            && !self.accessors.has_data(positions, element)?
-        {
-            let extension = "KHR_draco_mesh_compression";
-            return Err(GltfError::Extension { element: element.to_owned(), extension });
-        }
         let mode = match primitive.mode {
             Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
             Checked::Valid(mode) => {

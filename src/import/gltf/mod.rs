@@ -4,7 +4,7 @@
 //! panic on malformed ones, so the container, the accessors and every reference are checked here; nothing in this room indexes
 //! by a number from the file without looking first.
 //!
-//! `container` opens the file, `buffers` and `uri` find the bytes, `accessor` reads them, `geometry`, `texture`, `material` and
+//! `container` opens the file, `buffers` and `uri` find the bytes, `meshopt` and `draco` unpack them, `accessor` reads them, `geometry`, `texture`, `material` and
 //! `nodes` make the parts of the scene, and this file puts them together.
 
 mod accessor;
@@ -12,10 +12,12 @@ mod animation;
 mod buffers;
 mod container;
 mod deform;
+mod draco;
 mod error;
 mod geometry;
 mod instancing;
 mod material;
+mod meshopt;
 mod nodes;
 mod specular_glossiness;
 mod tangents;
@@ -55,10 +57,12 @@ pub(super) fn import(
     bytes: &[u8],
     options: &ImportOptions,
 ) -> Result<(Scene<SourceMaterial>, Vec<Warning>), GltfError> {
-    let document = container::open(bytes)?;
+    let mut document = container::open(bytes)?;
+    let mut buffers = Buffers::load(&document, files)?;
+    buffers.decompress(&mut document.root)?;
+    draco::decompress(&mut document.root, &mut buffers)?;
     let root = &document.root;
     let mut warnings = unread_extensions(root, name);
-    let buffers = Buffers::load(&document, files)?;
     let accessors = Accessors::new(root, &buffers);
     let pose = Pose::sample(root, &accessors, options, name, &mut warnings)?;
     let placed = nodes::place(root, &pose, name, &mut warnings)?;

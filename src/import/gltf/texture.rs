@@ -9,6 +9,7 @@ use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::NormalTexture;
 use gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
+use serde::Deserialize;
 
 use super::buffers::{Buffers, lookup, read_file, resolve};
 use super::error::GltfError;
@@ -48,6 +49,12 @@ impl Slot {
         };
         Ok(Self { index: texture.index.value(), tex_coord: texture.tex_coord, transform })
     }
+}
+
+/// EXT_texture_webp.
+#[derive(Deserialize)]
+struct WebP {
+    source: usize,
 }
 
 /// The textures of a file, made as materials ask for them.
@@ -144,12 +151,14 @@ impl<'a> Textures<'a> {
         }
         let json = lookup(&self.root.textures, index, element, "textures")?;
         let name = format!("textures[{index}]");
-        let source = json.source.value();
+        let others = json.extensions.as_ref().map(|e| &e.others);
+        // The extension's image comes first: the other one is for those who can't read it.
+        let source = match others.and_then(|o| o.get("EXT_texture_webp")) {
+            Some(json) => gltf::json::deserialize::from_value::<WebP>(json.clone())?.source,
+            None => json.source.value(),
+        };
         if source == u32::MAX as usize {
-            let others = json.extensions.as_ref().map(|e| &e.others);
-            for extension in
-                ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds", "EXT_texture_avif"]
-            {
+            for extension in ["KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif"] {
                 if others.is_some_and(|o| o.contains_key(extension)) {
                     return Err(GltfError::Extension { element: name, extension });
                 }
