@@ -170,19 +170,21 @@ impl Reader<'_, '_> {
             "KHR_materials_pbrSpecularGlossiness" => specular_glossiness::read(json, self, material)?,
             "KHR_materials_specular" => {
                 let json: Specular = parse(json)?;
+                let (texture, color_texture) = (json.specular_texture, json.specular_color_texture);
                 material.specular = Some(GltfSpecular {
                     factor: self.number("specularFactor", json.specular_factor, Limits::Unit)?,
+                    texture: self.info(texture.as_ref(), Encoding::Linear, "specularTexture")?,
                     color: self.color(
                         "specularColorFactor",
                         json.specular_color_factor,
                         Limits::NotNegative,
                     )?,
+                    color_texture: self.info(
+                        color_texture.as_ref(),
+                        Encoding::Srgb,
+                        "specularColorTexture",
+                    )?,
                 });
-                self.skip(json.specular_texture.as_ref(), "KHR_materials_specular.specularTexture");
-                self.skip(
-                    json.specular_color_texture.as_ref(),
-                    "KHR_materials_specular.specularColorTexture",
-                );
             }
             "KHR_materials_clearcoat" => {
                 let json: Clearcoat = parse(json)?;
@@ -209,13 +211,17 @@ impl Reader<'_, '_> {
                 let json: Sheen = parse(json)?;
                 material.sheen = Some(GltfSheen {
                     color: self.color("sheenColorFactor", json.sheen_color_factor, Limits::Unit)?,
+                    color_texture: self.info(
+                        json.sheen_color_texture.as_ref(),
+                        Encoding::Srgb,
+                        "sheenColorTexture",
+                    )?,
                     roughness: self.number(
                         "sheenRoughnessFactor",
                         json.sheen_roughness_factor,
                         Limits::Unit,
                     )?,
                 });
-                self.skip(json.sheen_color_texture.as_ref(), "KHR_materials_sheen.sheenColorTexture");
                 self.skip(json.sheen_roughness_texture.as_ref(), "KHR_materials_sheen.sheenRoughnessTexture");
             }
             "KHR_materials_anisotropy" => {

@@ -132,6 +132,9 @@ fn read_materials(
     root.materials.iter().enumerate().map(read).collect()
 }
 
+/// The meshes and materials of a mesh's primitives.
+type Parts = Vec<(MeshId, MaterialId)>;
+
 /// The scene as it is put together.
 struct Stage<'a> {
     root: &'a Root,
@@ -142,7 +145,7 @@ struct Stage<'a> {
     /// Where each node of the file stands, if the scene has it.
     worlds: Vec<Option<DAffine3>>,
     /// What became of each mesh of the file, for itself or for a node that deforms it: its primitives' meshes and materials.
-    meshes: BTreeMap<(usize, Option<usize>), Vec<(MeshId, MaterialId)>>,
+    meshes: BTreeMap<(usize, Option<usize>), Parts>,
     materials: Vec<Named<GltfMaterial>>,
     default_material: Option<MaterialId>,
     scene: Scene<SourceMaterial>,
@@ -255,7 +258,7 @@ impl Stage<'_> {
         deformer: Option<usize>,
         deformation: &Deformation,
         element: &str,
-    ) -> Result<Vec<(MeshId, MaterialId)>, GltfError> {
+    ) -> Result<Parts, GltfError> {
         let json = lookup(&self.root.meshes, index, element, "meshes")?;
         if let Some(parts) = self.meshes.get(&(index, deformer)) {
             return Ok(parts.clone());
