@@ -181,3 +181,39 @@ fn webp_images_are_read() {
     assert!(matches!(error_of(&textured(json!({"source": 3}))), GltfError::Reference { .. }));
     assert!(matches!(error_of(&textured(json!({}))), GltfError::Json(_)));
 }
+
+#[test]
+fn ktx2_images_are_read() {
+    let Some(corpus) = outside("PIPELINE_CORPUS") else { return };
+    let folder = Path::new(&corpus).join("gltf/AnisotropyBarnLamp");
+    let file = std::fs::read(folder.join("AnisotropyBarnLamp_normalbump.ktx2")).unwrap();
+    let textured = |ktx2: &[u8]| {
+        minimal(|json, bin| {
+            let view = bin.view(ktx2);
+            json["images"] = json!([{"bufferView": view, "mimeType": "image/ktx2"}]);
+            json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+            json["extensionsRequired"] = json!(["KHR_texture_basisu"]);
+            json["materials"] = json!([{"normalTexture": {"index": 0}}]);
+            json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        })
+    };
+    let scene = read("k.glb", &textured(&file)).unwrap().scene;
+    let image = &scene.images[0];
+    let Pixels::U8(values) = &image.pixels else { panic!() };
+    let channels = usize::from(image.channels);
+    assert_eq!(values.len(), image.width as usize * image.height as usize * channels);
+    // A normal map points outwards on the whole.
+    let mean = |c: usize| {
+        let sum: f64 = values.iter().skip(c).step_by(channels).map(|&v| f64::from(v)).sum();
+        sum * channels as f64 / values.len() as f64
+    };
+    assert!((mean(0) - 128.0).abs() < 8.0 && (mean(1) - 128.0).abs() < 8.0 && mean(2) > 200.0);
+    for length in (0..600).step_by(60) {
+        assert!(read("k.glb", &textured(&file[..length])).is_err(), "{length}");
+    }
+    for at in (0..300).chain((300..file.len()).step_by(file.len() / 100)) {
+        let mut file = file.clone();
+        file[at] ^= 0xff;
+        let _ = read("k.glb", &textured(&file));
+    }
+}

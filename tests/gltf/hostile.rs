@@ -242,12 +242,12 @@ fn what_only_an_unread_extension_holds_is_named() {
     let error = error_of(&draco);
     let property = "KHR_draco_mesh_compression";
     assert!(matches!(&error, GltfError::Invalid { property: p, .. } if *p == property), "{error}");
-    let basisu = minimal(|json, _| {
-        json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+    let dds = minimal(|json, _| {
+        json["textures"] = json!([{"extensions": {"MSFT_texture_dds": {"source": 0}}}]);
         json["materials"] = json!([{"emissiveTexture": {"index": 0}}]);
     });
-    let error = error_of(&basisu);
-    assert!(matches!(&error, GltfError::Extension { extension: "KHR_texture_basisu", .. }), "{error}");
+    let error = error_of(&dds);
+    assert!(matches!(&error, GltfError::Extension { extension: "MSFT_texture_dds", .. }), "{error}");
 }
 
 #[test]

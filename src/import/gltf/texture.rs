@@ -51,9 +51,9 @@ impl Slot {
     }
 }
 
-/// EXT_texture_webp.
+/// KHR_texture_basisu and EXT_texture_webp.
 #[derive(Deserialize)]
-struct WebP {
+struct Source {
     source: usize,
 }
 
@@ -153,12 +153,14 @@ impl<'a> Textures<'a> {
         let name = format!("textures[{index}]");
         let others = json.extensions.as_ref().map(|e| &e.others);
         // The extension's image comes first: the other one is for those who can't read it.
-        let source = match others.and_then(|o| o.get("EXT_texture_webp")) {
-            Some(json) => gltf::json::deserialize::from_value::<WebP>(json.clone())?.source,
+        let of_extension =
+            |o: &'a serde_json::Map<_, _>| o.get("KHR_texture_basisu").or_else(|| o.get("EXT_texture_webp"));
+        let source = match others.and_then(of_extension) {
+            Some(json) => gltf::json::deserialize::from_value::<Source>(json.clone())?.source,
             None => json.source.value(),
         };
         if source == u32::MAX as usize {
-            for extension in ["KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif"] {
+            for extension in ["MSFT_texture_dds", "EXT_texture_avif"] {
                 if others.is_some_and(|o| o.contains_key(extension)) {
                     return Err(GltfError::Extension { element: name, extension });
                 }
