@@ -82,6 +82,15 @@ pub(super) struct Arguments {
     /// Read glTF's punctual lights as Blender does: divided by 683.
     #[arg(long)]
     blender_lights: bool,
+    /// The material variant of a glTF file (KHR_materials_variants), by name.
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
+    /// The moment of a glTF file's animation that is rendered; without it the pose at rest.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    time: Option<f32>,
+    /// The animation of a glTF file, by name; without it the first.
+    #[arg(long, value_name = "NAME")]
+    animation: Option<String>,
     /// The tone curve of a PNG: neutral, srgb or agx.
     #[arg(long, value_name = "CURVE", value_parser = parse_enum::<ToneCurve>, default_value = "neutral")]
     tone: ToneCurve,
@@ -125,6 +134,9 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     }
     let import_options = ImportOptions {
         light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
+        variant: arguments.variant.clone(),
+        time: arguments.time,
+        animation: arguments.animation.clone(),
     };
     let convert_options = ConvertOptions { diffuse: arguments.diffuse };
     let materials = arguments.materials.as_deref();

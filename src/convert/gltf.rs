@@ -87,8 +87,8 @@ pub(super) fn convert(
     convert_emission(source, &mut material, &mut notes);
     if let Some(map) = &source.normal_texture {
         material.normal_map = Some(NormalMap { map: map.clone(), scale: source.normal_scale });
-        let reason = "with the mesh's tangents; without them the frame follows the texture coordinates, which is \
-                      MikkTSpace's up to its smoothing";
+        let reason =
+            "with the mesh's tangents or MikkTSpace's; a mesh without normals has the triangles' own";
         notes.add("normalTexture", Quality::Exact, reason);
     }
     if source.occlusion {
@@ -167,7 +167,20 @@ fn opacity(source: &GltfMaterial, notes: &mut Notes) -> Opacity {
 
 fn note_unread(source: &GltfMaterial, notes: &mut Notes) {
     for name in &source.unread {
-        notes.add(name, Quality::Dropped, "not read");
+        let reason = match name.as_str() {
+            "KHR_materials_dispersion" => "all wavelengths are bent alike",
+            "KHR_materials_iridescence" => "Disney's lobes have no thin film",
+            _ => "not read",
+        };
+        notes.add(name, Quality::Dropped, reason);
+    }
+    if source.specular_glossiness {
+        let mut reason =
+            "metallic and base colour by Khronos' solveMetallic; F0 of a dielectric is 0.04".to_owned();
+        if source.metallic_roughness_texture.is_some() {
+            reason.push_str("; textures are converted texel by texel, to 8 bits");
+        }
+        notes.add("KHR_materials_pbrSpecularGlossiness", Quality::Approximated, &reason);
     }
 }
 
@@ -223,15 +236,22 @@ fn convert_specular(
     notes: &mut Notes,
 ) {
     let f0_ior = f0_of_ior(source.ior.unwrap_or(DEFAULT_IOR));
-    let extension = source.specular.unwrap_or(GltfSpecular { factor: 1.0, color: Rgb::WHITE });
+    let none = GltfSpecular { factor: 1.0, texture: None, color: Rgb::WHITE, color_texture: None };
+    let extension = source.specular.as_ref().unwrap_or(&none);
     // In f64, so that the default F0 of 0.04 is specular 0.5 to the bit.
     let f0 = extension.color.cast().map(|c: f64| (f0_ior * c).min(1.0) * f64::from(extension.factor));
     let tint = fit_tint(f0, source.base_color_factor);
     // Rounding may lift the luminance of white above 1.
     let specular = ((disney_luminance(f0) / F0_OF_SPECULAR) as f32).min(Parameter::Specular.max());
-    *material.scalar_mut(Parameter::Specular) = Param::Constant(specular);
+    // F0 is in proportion to the factor, and so to its texture; a colour's luminance stands mostly in its green.
+    let strength = extension.texture.as_ref();
+    let (map, channel) = match (strength, extension.color_texture.as_ref()) {
+        (Some(strength), _) => (Some(strength), TextureChannel::A),
+        (None, color) => (color, TextureChannel::G),
+    };
+    *material.scalar_mut(Parameter::Specular) = textured(specular, map, channel);
     *material.scalar_mut(Parameter::SpecularTint) = Param::Constant(tint.amount);
-    *material.scalar_mut(Parameter::F90) = Param::Constant(extension.factor);
+    *material.scalar_mut(Parameter::F90) = textured(extension.factor, strength, TextureChannel::A);
     match source.ior {
         Some(0.0) => {
             let reason = "0 means a reflectance of 1 at all angles: F0 is 1, but the diffuse term stays";
@@ -250,6 +270,14 @@ fn convert_specular(
             reason.push_str("; f90 carries the factor to grazing angles");
         }
         notes.add("KHR_materials_specular", Quality::Approximated, &reason);
+        let (quality, reason) = match (strength, &extension.color_texture) {
+            (_, None) => return,
+            (Some(_), Some(_)) => (Quality::Dropped, "a parameter has one texture: that is specularTexture"),
+            (None, Some(_)) => {
+                (Quality::Approximated, "its green stands for its luminance, its hue is the factor's")
+            }
+        };
+        notes.add("KHR_materials_specular.specularColorTexture", quality, reason);
     }
 }
 
@@ -273,13 +301,20 @@ fn convert_clearcoat(coat: &GltfClearcoat, material: &mut Material, notes: &mut 
 fn convert_sheen(sheen: &GltfSheen, source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
     let color = sheen.color.cast();
     let tint = fit_tint(color, source.base_color_factor);
-    *material.scalar_mut(Parameter::Sheen) = Param::Constant((disney_luminance(color) as f32).min(1.0));
+    let amount = (disney_luminance(color) as f32).min(1.0);
+    // A colour's luminance stands mostly in its green.
+    *material.scalar_mut(Parameter::Sheen) =
+        textured(amount, sheen.color_texture.as_ref(), TextureChannel::G);
     *material.scalar_mut(Parameter::SheenTint) = Param::Constant(tint.amount);
     let reason = format!(
         "no roughness; Charlie's lobe is 6 to 26 times brighter than Disney's at an equal factor; hue: {}",
         tint.describe()
     );
     notes.add("KHR_materials_sheen", Quality::Approximated, &reason);
+    if sheen.color_texture.is_some() {
+        let reason = "its green stands for its luminance, its hue is the factor's";
+        notes.add("KHR_materials_sheen.sheenColorTexture", Quality::Approximated, reason);
+    }
 }
 
 /// KHR_materials_anisotropy: with a = roughness² along the bitangent and t = a + (1-a)·strength² along the tangent, Disney's

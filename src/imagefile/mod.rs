@@ -1,4 +1,4 @@
-//! Image files: a [`Raster`] from and to EXR, PNG, JPEG and Radiance HDR, with bounded memory.
+//! Image files: a [`Raster`] from and to EXR, PNG, JPEG, WebP, KTX2 and Radiance HDR, with bounded memory.
 //!
 //! A file is known by its first bytes, never by its extension. Whatever a file declares is checked against [`MAX_VALUES`]
 //! before memory is asked for, and whatever we write appears whole or not at all ([`write_whole`]).
@@ -6,7 +6,8 @@
 //! - `error`: what can go wrong
 //! - `exr_header`: walking an EXR header: what it declares, and putting its attributes in order
 //! - `exr_read`, `exr_write`: the pixels of an EXR
-//! - `picture`: PNG, JPEG and HDR
+//! - `ktx2`: Basis Universal in KTX2
+//! - `picture`: PNG, JPEG, WebP and HDR
 //! - `texture`: any of them as a texture's interleaved pixels
 //! - `whole`: files that appear whole
 
@@ -14,6 +15,7 @@ mod error;
 mod exr_header;
 mod exr_read;
 mod exr_write;
+mod ktx2;
 mod picture;
 mod texture;
 mod whole;
@@ -43,17 +45,23 @@ enum Format {
     Png,
     Jpeg,
     Hdr,
+    WebP,
+    Ktx2,
 }
 
 impl Format {
     /// The format that the first bytes announce.
     fn of(bytes: &[u8], name: &str) -> Result<Self, ImageFileError> {
-        let known: [(&[u8], Self); 5] = [
+        if let [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] = bytes {
+            return Ok(Self::WebP);
+        }
+        let known: [(&[u8], Self); 6] = [
             (&[0x76, 0x2f, 0x31, 0x01], Self::Exr),
             (&[0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a], Self::Png),
             (&[0xff, 0xd8, 0xff], Self::Jpeg),
             (b"#?RADIANCE", Self::Hdr),
             (b"#?RGBE", Self::Hdr),
+            (ktx2::MAGIC, Self::Ktx2),
         ];
         known
             .iter()
@@ -66,8 +74,6 @@ impl Format {
 /// Formats that are known but not read, for a clearer message.
 fn recognised(bytes: &[u8]) -> &'static str {
     match bytes {
-        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', ..] => "a KTX2 image",
-        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => "a WebP image",
         [b'I', b'I', 42, 0, ..] | [b'M', b'M', 0, 42, ..] => "a TIFF image",
         [b'D', b'D', b'S', b' ', ..] => "a DDS image",
         [b'G', b'I', b'F', b'8', ..] => "a GIF image",
@@ -76,7 +82,7 @@ fn recognised(bytes: &[u8]) -> &'static str {
     }
 }
 
-/// Reads an image file: every part and channel of an EXR at full resolution, or the single layer of a PNG, JPEG or HDR.
+/// Reads an image file: every part and channel of an EXR at full resolution, or the single layer of a PNG, JPEG, WebP, KTX2 or HDR.
 ///
 /// Integer samples become [0, 1]. Alpha is associated (premultiplied), as in EXR and as OpenImageIO reads PNG. Non-finite
 /// values are kept.

@@ -1,4 +1,4 @@
-//! PNG, JPEG and Radiance HDR, through the `image` crate.
+//! PNG, JPEG, WebP and Radiance HDR, through the `image` crate.
 
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,12 +7,13 @@ use std::path::Path;
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::{PngDecoder, PngEncoder};
+use image::codecs::webp::WebPDecoder;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, Limits};
 
 use crate::raster::{Channel, Layer, Raster, SampleType, Window};
 
 use super::texture::{Decoded, Samples};
-use super::{Format, ImageFileError, MAX_VALUES, write_whole};
+use super::{Format, ImageFileError, MAX_VALUES, ktx2, write_whole};
 
 /// Decodes a picture to a raster of one layer: channels `Y`, `Y A`, `R G B` or `R G B A`, integers as value / maximum, alpha
 /// associated.
@@ -28,9 +29,11 @@ pub(super) fn decode_interleaved(
     name: &str,
 ) -> Result<Decoded, ImageFileError> {
     // The decoders are made for hostile input; should one still panic, it has no state beyond this call.
-    let image = catch_unwind(AssertUnwindSafe(|| decode_dynamic(bytes, format, name)))
-        .unwrap_or_else(|_| Err(damaged(name, "its compressed data makes no sense")))?;
-    interleaved(image, name)
+    catch_unwind(AssertUnwindSafe(|| match format {
+        Format::Ktx2 => ktx2::decode(bytes, name),
+        _ => interleaved(decode_dynamic(bytes, format, name)?, name),
+    }))
+    .unwrap_or_else(|_| Err(damaged(name, "its compressed data makes no sense")))
 }
 
 fn damaged(name: &str, why: impl ToString) -> ImageFileError {
@@ -43,8 +46,9 @@ fn decode_dynamic(bytes: &[u8], format: Format, name: &str) -> Result<DynamicIma
     match format {
         Format::Png => finish(PngDecoder::with_limits(input, limits()).map_err(about)?, name),
         Format::Jpeg => finish(JpegDecoder::new(input).map_err(about)?, name),
+        Format::WebP => finish(WebPDecoder::new(input).map_err(about)?, name),
         Format::Hdr => finish(HdrDecoder::new(input).map_err(about)?, name),
-        Format::Exr => Err(damaged(name, "an EXR came to the wrong decoder")),
+        Format::Exr | Format::Ktx2 => Err(damaged(name, "it came to the wrong decoder")),
     }
 }
 

@@ -44,10 +44,20 @@ pub struct Imported {
 }
 
 /// What an import leaves to its caller.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ImportOptions {
     /// The unit that the intensities of glTF's punctual lights are read in.
     pub light_units: LightUnits,
+    /// The variant of glTF's KHR_materials_variants whose materials are taken, by name. None takes the primitives' own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variant: Option<String>,
+    /// The moment of a glTF file's animation that is shown, in seconds. None, without an animation either, is the rest pose:
+    /// nodes and morph weights as they stand in the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f32>,
+    /// The animation that `time` is of, by name. None is the first; one without a time is shown at 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub animation: Option<String>,
 }
 
 /// The unit of glTF's punctual lights.
@@ -186,6 +196,11 @@ fn import_with(
             (of_config.scene, of_config.warnings)
         }
     };
+    let gltf_alone = options.variant.is_some() || options.animation.is_some() || options.time.is_some();
+    if dialect != Dialect::Gltf && gltf_alone {
+        let message = "variants and animations are glTF's: those asked for are of no effect";
+        warnings.push(Warning::new(name, message));
+    }
     validate::validate(&mut scene, name, &mut warnings)
         .map_err(|cause| ImportError::Invalid { path: path.to_owned(), cause })?;
     Ok(Imported { scene, warnings, files: digests.unwrap_or_else(|| files.into_digests()) })

@@ -81,7 +81,7 @@ fn a_specular_colour_of_the_bases_hue_is_kept() {
     let base = Rgb::new(0.8, 0.4, 0.2);
     let source = |color| GltfMaterial {
         base_color_factor: base,
-        specular: Some(GltfSpecular { factor: 0.5, color }),
+        specular: Some(GltfSpecular { factor: 0.5, texture: None, color, color_texture: None }),
         ..GltfMaterial::default()
     };
     let (material, notes) = run(&source(base));
@@ -94,6 +94,26 @@ fn a_specular_colour_of_the_bases_hue_is_kept() {
     assert_eq!(scalar(&material, Parameter::SpecularTint), 0.0, "the opposite hue");
     let note = notes.iter().find(|n| n.field == "KHR_materials_specular").unwrap();
     assert!(note.reason.contains("off by"), "{}", note.reason);
+}
+
+#[test]
+fn specular_and_sheen_textures_multiply_what_they_scale() {
+    let map = |id| Some(TextureMap::new(TextureId(id), TextureChannel::R));
+    let source = |texture, color_texture| GltfMaterial {
+        specular: Some(GltfSpecular { factor: 0.5, texture, color: Rgb::WHITE, color_texture }),
+        sheen: Some(GltfSheen { color: Rgb::WHITE, color_texture: map(9), roughness: 0.3 }),
+        ..GltfMaterial::default()
+    };
+    let read = |id, channel, factor| Param::Texture { map: TextureMap::new(TextureId(id), channel), factor };
+    let (material, notes) = run(&source(map(3), map(4)));
+    assert_eq!(*material.scalar(Parameter::Specular), read(3, TextureChannel::A, 0.25));
+    assert_eq!(*material.scalar(Parameter::F90), read(3, TextureChannel::A, 0.5));
+    assert_eq!(*material.scalar(Parameter::Sheen), read(9, TextureChannel::G, 1.0));
+    assert_eq!(quality(&notes, "KHR_materials_specular.specularColorTexture"), Quality::Dropped);
+    let (material, notes) = run(&source(None, map(4)));
+    assert_eq!(*material.scalar(Parameter::Specular), read(4, TextureChannel::G, 0.25));
+    assert_eq!(scalar(&material, Parameter::F90), 0.5);
+    assert_eq!(quality(&notes, "KHR_materials_specular.specularColorTexture"), Quality::Approximated);
 }
 
 #[test]
@@ -183,7 +203,7 @@ fn diffuse_transmission_keeps_its_own_colour() {
 
 #[test]
 fn the_specular_factor_dims_grazing_angles_too() {
-    let specular = Some(GltfSpecular { factor: 0.25, color: Rgb::WHITE });
+    let specular = Some(GltfSpecular { factor: 0.25, texture: None, color: Rgb::WHITE, color_texture: None });
     let (material, _) = run(&GltfMaterial { specular, ..GltfMaterial::default() });
     assert_eq!(scalar(&material, Parameter::F90), 0.25);
     assert!((scalar(&material, Parameter::Specular) - 0.125).abs() < 1e-7);

@@ -42,9 +42,9 @@ impl<'a> Accessors<'a> {
         Ok(type_of(accessor, index)?.multiplicity())
     }
 
-    /// Whether `accessors[index]` has bytes of its own, apart from sparse ones.
-    pub(super) fn has_data(&self, index: usize, element: &str) -> Result<bool, GltfError> {
-        Ok(lookup(&self.root.accessors, index, element, "accessors")?.buffer_view.is_some())
+    /// The number of elements that `accessors[index]` says it has; 0 if it isn't there.
+    pub(super) fn count(&self, index: usize) -> usize {
+        self.root.accessors.get(index).map_or(0, |a| usize::try_from(a.count.0).unwrap_or(usize::MAX))
     }
 
     /// `accessors[index]` as vectors of N floats, which `element` asks for. Normalised integers become [0, 1] or [-1, 1].
@@ -104,7 +104,7 @@ impl<'a> Accessors<'a> {
     ) -> Result<Vec<T>, GltfError> {
         let name = format!("accessors[{index}]");
         let count = accessor.count.0;
-        self.count(count)?;
+        self.charge(count)?;
         let size = component.size() * components;
         let mut elements = match accessor.buffer_view {
             Some(view) => {
@@ -206,7 +206,7 @@ impl<'a> Accessors<'a> {
     }
 
     /// Counts what is read: a small file may ask for the same elements again and again.
-    fn count(&self, elements: u64) -> Result<(), GltfError> {
+    fn charge(&self, elements: u64) -> Result<(), GltfError> {
         self.read.set(self.read.get().saturating_add(elements));
         if self.read.get() > MAX_ELEMENTS {
             return Err(GltfError::TooMany { what: "elements of accessors", limit: MAX_ELEMENTS });

@@ -3,11 +3,13 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use gltf::json::Root;
 use gltf::json::buffer::View;
+use gltf::json::validation::USize64;
+use gltf::json::{Index, Root};
 
 use super::container::Document;
 use super::error::{GltfError, UriProblem};
+use super::meshopt::{self, Compressed};
 use super::uri::{self, Target};
 use crate::import::Files;
 
@@ -19,19 +21,26 @@ pub(super) struct Buffers<'a> {
     /// Index into `contents` and the length that the file declares.
     buffers: Vec<(usize, usize)>,
     contents: Vec<Cow<'a, [u8]>>,
+    /// The bytes of all of them.
+    total: u64,
 }
 
 impl<'a> Buffers<'a> {
     /// Reads every buffer: the GLB's own chunk, data: URIs, and files, each once.
     pub(super) fn load(document: &Document<'a>, files: &mut Files) -> Result<Self, GltfError> {
-        let mut loaded = Self { buffers: Vec::new(), contents: Vec::new() };
+        let mut loaded = Self { buffers: Vec::new(), contents: Vec::new(), total: 0 };
         let mut by_name: BTreeMap<String, usize> = BTreeMap::new();
-        let mut total = 0u64;
         for (i, buffer) in document.root.buffers.iter().enumerate() {
             let element = format!("buffers[{i}]");
             let content = match &buffer.uri {
                 None if i == 0 && document.blob.is_some() => {
                     loaded.push(Cow::Borrowed(document.blob.unwrap_or_default()))
+                }
+                None if document.root.extensions_used.iter().any(|e| e == meshopt::EXTENSION) => {
+                    // A placeholder: what lies in it is decompressed from elsewhere.
+                    let empty = loaded.push(Cow::Borrowed(&[]));
+                    loaded.buffers.push((empty, 0));
+                    continue;
                 }
                 None => return Err(without_data(document, element)),
                 Some(uri) => match resolve(uri, &element)? {
@@ -55,10 +64,7 @@ impl<'a> Buffers<'a> {
                     available,
                 });
             }
-            total = total.saturating_add(available);
-            if total > MAX_TOTAL {
-                return Err(GltfError::TooMany { what: "bytes in buffers", limit: MAX_TOTAL });
-            }
+            loaded.charge(available)?;
             loaded.buffers.push((content, buffer.byte_length.0 as usize));
         }
         Ok(loaded)
@@ -69,6 +75,54 @@ impl<'a> Buffers<'a> {
         self.contents.len() - 1
     }
 
+    /// Counts what buffers take.
+    fn charge(&mut self, bytes: u64) -> Result<(), GltfError> {
+        self.total = self.total.saturating_add(bytes);
+        if self.total > MAX_TOTAL {
+            return Err(GltfError::TooMany { what: "bytes in buffers", limit: MAX_TOTAL });
+        }
+        Ok(())
+    }
+
+    /// Decompresses every view of `root` that EXT_meshopt_compression has packed: it then lies in a buffer of its own.
+    pub(super) fn decompress(&mut self, root: &mut Root) -> Result<(), GltfError> {
+        for (i, view) in root.buffer_views.iter_mut().enumerate() {
+            let Some(packed) = Compressed::of(view)? else { continue };
+            let element = format!("bufferViews[{i}]");
+            let data = self.range(packed.buffer, packed.byte_offset, packed.byte_length, &element)?;
+            let bytes = packed.decode(view, data, &element)?;
+            view.byte_offset = None;
+            view.buffer = Index::new(self.add(bytes)?);
+        }
+        Ok(())
+    }
+
+    /// A new buffer of `bytes`.
+    fn add(&mut self, bytes: Vec<u8>) -> Result<u32, GltfError> {
+        self.charge(bytes.len() as u64)?;
+        let length = bytes.len();
+        let content = self.push(Cow::Owned(bytes));
+        self.buffers.push((content, length));
+        Ok(self.buffers.len() as u32 - 1)
+    }
+
+    /// A new view in `root` of a new buffer of `bytes`.
+    pub(super) fn add_view(&mut self, root: &mut Root, bytes: Vec<u8>) -> Result<u32, GltfError> {
+        let byte_length = USize64(bytes.len() as u64);
+        let buffer = Index::new(self.add(bytes)?);
+        root.buffer_views.push(View {
+            buffer,
+            byte_length,
+            byte_offset: None,
+            byte_stride: None,
+            name: None,
+            target: None,
+            extensions: None,
+            extras: Default::default(),
+        });
+        Ok(root.buffer_views.len() as u32 - 1)
+    }
+
     /// The bytes of `bufferViews[index]`, which `element` refers to, with the view itself.
     pub(super) fn view<'r>(
         &'r self,
@@ -77,16 +131,21 @@ impl<'a> Buffers<'a> {
         element: &str,
     ) -> Result<(&'r [u8], &'r View), GltfError> {
         let view = lookup(&root.buffer_views, index, element, "bufferViews")?;
-        let name = format!("bufferViews[{index}]");
-        let &(content, length) = lookup(&self.buffers, view.buffer.value(), &name, "buffers")?;
-        let bytes = &self.contents[content][..length];
         let offset = view.byte_offset.unwrap_or_default().0;
-        let end = u128::from(offset) + u128::from(view.byte_length.0);
-        if end > length as u128 {
-            let container = format!("buffers[{}]", view.buffer.value());
-            return Err(GltfError::Bytes { element: name, container, needed: end, available: length as u64 });
+        let name = format!("bufferViews[{index}]");
+        Ok((self.range(view.buffer.value(), offset, view.byte_length.0, &name)?, view))
+    }
+
+    /// `length` bytes from `offset` on of `buffers[index]`, which `element` refers to.
+    fn range(&self, index: usize, offset: u64, length: u64, element: &str) -> Result<&[u8], GltfError> {
+        let &(content, size) = lookup(&self.buffers, index, element, "buffers")?;
+        let end = u128::from(offset) + u128::from(length);
+        if end > size as u128 {
+            let container = format!("buffers[{index}]");
+            let (element, available) = (element.to_owned(), size as u64);
+            return Err(GltfError::Bytes { element, container, needed: end, available });
         }
-        Ok((&bytes[offset as usize..end as usize], view))
+        Ok(&self.contents[content][offset as usize..end as usize])
     }
 }
 
@@ -121,11 +180,9 @@ pub(super) fn read_file(files: &mut Files, name: &str, element: &str) -> Result<
 
 /// A buffer without data: a placeholder for what only an extension can read, or a mistake.
 fn without_data(document: &Document, element: String) -> GltfError {
-    let used = &document.root.extensions_used;
-    for extension in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
-        if used.iter().any(|e| e == extension) {
-            return GltfError::Extension { element, extension };
-        }
+    let extension = "KHR_meshopt_compression";
+    if document.root.extensions_used.iter().any(|e| e == extension) {
+        return GltfError::Extension { element, extension };
     }
     GltfError::Missing { element, property: "uri, and the file no binary chunk" }
 }

@@ -2,22 +2,33 @@
 
 use gltf::json::{Root, Value};
 
+use super::animation::NO_NODE;
 use super::error::GltfError;
 
-/// The extensions that are read. A file that requires another one is refused.
+/// The extensions that are read, or dropped with a note. A file that requires another one is refused.
 pub(super) const EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
 ];
@@ -102,7 +113,7 @@ fn check_extensions(json: &Value) -> Result<(), GltfError> {
     Ok(())
 }
 
-/// Makes up for what the `gltf` crate's JSON types get wrong: a scene without nodes is legal, and an index beyond 2³² - 1 must not
+/// Makes up for what the `gltf` crate's JSON types get wrong: a scene without nodes is legal, so is a channel without one, and an index beyond 2³² - 1 must not
 /// wrap around to a small one.
 fn prepare(json: &mut Value) {
     for scene in json.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
@@ -110,11 +121,22 @@ fn prepare(json: &mut Value) {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
         }
     }
+    // A channel whose target an extension names has no node.
+    for animation in json.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten() {
+        for channel in animation.get_mut("channels").and_then(Value::as_array_mut).into_iter().flatten() {
+            if let Some(target) = channel.get_mut("target").and_then(Value::as_object_mut) {
+                target.entry("node").or_insert(Value::from(NO_NODE));
+            }
+        }
+    }
     saturate_indices(json, None);
 }
 
 /// The properties that the crate truncates to 32 bits.
-const TRUNCATED: [&str; 21] = [
+const TRUNCATED: [&str; 28] = [
+    "NORMAL",
+    "POSITION",
+    "TANGENT",
     "attributes",
     "buffer",
     "bufferView",
@@ -123,6 +145,8 @@ const TRUNCATED: [&str; 21] = [
     "componentType",
     "index",
     "indices",
+    "input",
+    "inverseBindMatrices",
     "joints",
     "light",
     "magFilter",
@@ -130,7 +154,9 @@ const TRUNCATED: [&str; 21] = [
     "mesh",
     "minFilter",
     "mode",
+    "node",
     "nodes",
+    "output",
     "sampler",
     "scene",
     "skin",
@@ -170,9 +196,8 @@ mod tests {
     #[test]
     fn required_extensions_come_before_anything_else() {
         // The rest of the file is nonsense.
-        let error =
-            root(r#"{"extensionsRequired": ["KHR_draco_mesh_compression"], "meshes": 3}"#).unwrap_err();
-        assert!(error.to_string().contains("KHR_draco_mesh_compression"), "{error}");
+        let error = root(r#"{"extensionsRequired": ["VENDOR_compression"], "meshes": 3}"#).unwrap_err();
+        assert!(error.to_string().contains("requires the extension VENDOR_compression"), "{error}");
     }
 
     #[test]

@@ -51,6 +51,16 @@ pub enum GltfError {
         /// The extensions that are read.
         known: &'static [&'static str],
     },
+    /// The caller asks for something by a name that nothing has.
+    #[error("there is no {kind} called {name:?}; {}", names(known))]
+    Unknown {
+        /// What it asks for.
+        kind: &'static str,
+        /// The name.
+        name: String,
+        /// The names that there are.
+        known: Vec<String>,
+    },
     /// An element's data is only there through an extension that is not read.
     #[error("{element} needs the extension {extension}, which is not read")]
     Extension {
@@ -182,6 +192,11 @@ pub enum GltfError {
     /// An image that can't be used.
     #[error(transparent)]
     Image(#[from] ImageFileError),
+}
+
+/// The names to choose from, in a sentence.
+fn names(known: &[String]) -> String {
+    if known.is_empty() { "the file has none".to_owned() } else { format!("there are: {}", known.join(", ")) }
 }
 
 /// What is wrong with a `uri`.

@@ -7,13 +7,15 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::accessor::Accessors;
+use super::deform::Deformation;
 use super::error::GltfError;
+use super::tangents;
 use crate::import::validate::compact;
 use crate::record::Warning;
 use crate::scene::Mesh;
 
 /// The most triangles that all meshes of a file may have together.
-const MAX_TRIANGLES: u64 = 1 << 27;
+pub(super) const MAX_TRIANGLES: u64 = 1 << 27;
 
 /// What becomes of the alpha of vertex colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +24,22 @@ pub(super) enum VertexAlpha {
     Keep,
     /// It is 1: the material's alpha mode is OPAQUE, which ignores alpha.
     Ignore,
+}
+
+/// A primitive as it is to be read.
+pub(super) struct Part<'p> {
+    /// The primitive.
+    pub(super) primitive: &'p Primitive,
+    /// Its place in the file.
+    pub(super) element: &'p str,
+    /// The name of the mesh that becomes of it.
+    pub(super) name: String,
+    /// What becomes of its vertex colours' alpha.
+    pub(super) alpha: VertexAlpha,
+    /// The texture coordinates that its tangents follow, if its material needs any.
+    pub(super) tangents: Option<u32>,
+    /// How its vertices are moved.
+    pub(super) deformation: &'p Deformation,
 }
 
 /// Reads primitives and counts their triangles.
@@ -37,30 +55,26 @@ impl<'a> Geometry<'a> {
         Self { accessors, triangles: 0, file }
     }
 
-    /// The mesh called `name` of the primitive `element`; none, with a warning, if it has no triangles.
+    /// What reads the file's accessors.
+    pub(super) fn accessors(&self) -> &Accessors<'a> {
+        &self.accessors
+    }
+
+    /// The mesh of a primitive; none, with a warning, if it has no triangles.
     pub(super) fn read(
         &mut self,
-        primitive: &Primitive,
-        element: &str,
-        name: String,
-        alpha: VertexAlpha,
+        part: Part,
         warnings: &mut Vec<Warning>,
     ) -> Result<Option<Arc<Mesh>>, GltfError> {
+        let Part { primitive, element, name, alpha, tangents: tangent_set, deformation } = part;
         let file = self.file;
         let mut warn = |message: String| {
             warnings.push(Warning::new(format!("{file}: mesh {name:?} ({element})"), message));
         };
-        let others = primitive.extensions.as_ref().map(|e| &e.others);
         let Some(positions) = attribute(primitive, Semantic::Positions) else {
             warn("it has no POSITION and is left out".into());
             return Ok(None);
         };
-        if others.is_some_and(|o| o.contains_key("KHR_draco_mesh_compression"))
-            && !self.accessors.has_data(positions, element)?
-        {
-            let extension = "KHR_draco_mesh_compression";
-            return Err(GltfError::Extension { element: element.to_owned(), extension });
-        }
         let mode = match primitive.mode {
             Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
             Checked::Valid(mode) => {
@@ -72,11 +86,8 @@ impl<'a> Geometry<'a> {
                 return Err(GltfError::Invalid { element: element.to_owned(), property, expected });
             }
         };
-        if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-            warn("its morph targets are not applied: it is shown at rest".into());
-        }
 
-        let mut mesh = Mesh { positions: self.vectors(positions, element)?, ..Mesh::default() };
+        let mut mesh = Mesh { positions: vectors(&self.accessors, positions, element)?, ..Mesh::default() };
         let vertices = mesh.positions.len();
         let corners = match primitive.indices {
             Some(index) => self.accessors.indices(index.value(), element)?,
@@ -92,6 +103,10 @@ impl<'a> Geometry<'a> {
         mesh.triangles = triangles(&corners, mode);
         self.count(mesh.triangles.len())?;
         self.read_attributes(primitive, element, alpha, &mut mesh, &mut warn)?;
+        deformation.morph(primitive, element, &self.accessors, &mut mesh)?;
+        let set = tangent_set.filter(|_| mesh.tangents.is_empty());
+        let split = set.and_then(|set| tangents::generate(&mut mesh, set as usize));
+        deformation.skin(primitive, element, &self.accessors, split.as_deref(), &mut mesh, &mut warn)?;
         mesh.name = name;
         compact(&mut mesh);
         Ok(Some(Arc::new(mesh)))
@@ -115,7 +130,7 @@ impl<'a> Geometry<'a> {
             Err(GltfError::AttributeCount { element, attribute, found, vertices })
         };
         if let Some(index) = attribute(primitive, Semantic::Normals) {
-            mesh.normals = self.vectors(index, element)?;
+            mesh.normals = vectors(&self.accessors, index, element)?;
             check("NORMAL", mesh.normals.len())?;
         }
         // Without normals the specification asks for flat ones and to ignore the tangents.
@@ -146,10 +161,6 @@ impl<'a> Geometry<'a> {
         Ok(())
     }
 
-    fn vectors(&self, index: usize, element: &str) -> Result<Vec<Vec3>, GltfError> {
-        Ok(self.accessors.floats::<3>(index, element)?.into_iter().map(Vec3::from).collect())
-    }
-
     /// Vertex colours with or without alpha; they are linear (glTF 2.0, 3.7.2.1).
     fn colors(&self, index: usize, element: &str, alpha: VertexAlpha) -> Result<Vec<Vec4>, GltfError> {
         if self.accessors.components(index, element)? == 3 {
@@ -171,6 +182,11 @@ impl<'a> Geometry<'a> {
         }
         Ok(())
     }
+}
+
+/// `accessors[index]` as vectors.
+pub(super) fn vectors(accessors: &Accessors, index: usize, element: &str) -> Result<Vec<Vec3>, GltfError> {
+    Ok(accessors.floats::<3>(index, element)?.into_iter().map(Vec3::from).collect())
 }
 
 /// The accessor of an attribute.

@@ -7,6 +7,7 @@ use gltf::json::validation::Checked;
 use serde::Deserialize;
 
 use super::error::GltfError;
+use super::specular_glossiness;
 use super::texture::{Slot, Textures};
 use crate::color::Rgb;
 use crate::scene::material::TextureMap;
@@ -18,7 +19,7 @@ use crate::scene::texture::Encoding;
 
 /// The legal values of a number.
 #[derive(Clone, Copy)]
-enum Limits {
+pub(super) enum Limits {
     Unit,
     NotNegative,
     Positive,
@@ -80,10 +81,13 @@ pub(super) fn read(
     Ok(material)
 }
 
-struct Reader<'r, 'a> {
-    name: &'r str,
+/// Reads the parts of a material.
+pub(super) struct Reader<'r, 'a> {
+    /// The material's name.
+    pub(super) name: &'r str,
     index: usize,
-    textures: &'r mut Textures<'a>,
+    /// The file's textures.
+    pub(super) textures: &'r mut Textures<'a>,
     unread: Vec<String>,
 }
 
@@ -92,7 +96,8 @@ impl Reader<'_, '_> {
         format!("materials[{}].{field}", self.index)
     }
 
-    fn number(&self, field: &'static str, value: f32, limits: Limits) -> Result<f32, GltfError> {
+    /// The number `value` of `field`, if it is within `limits`.
+    pub(super) fn number(&self, field: &'static str, value: f32, limits: Limits) -> Result<f32, GltfError> {
         let (fits, expected) = match limits {
             Limits::Unit => ((0.0..=1.0).contains(&value), "in [0, 1]"),
             Limits::NotNegative => (value.is_finite() && value >= 0.0, "finite and not negative"),
@@ -104,12 +109,19 @@ impl Reader<'_, '_> {
         if fits { Ok(value) } else { Err(GltfError::Factor { material: material(), field, value, expected }) }
     }
 
-    fn color(&self, field: &'static str, color: [f32; 3], limits: Limits) -> Result<Rgb, GltfError> {
+    /// The colour `color` of `field`, if it is within `limits`.
+    pub(super) fn color(
+        &self,
+        field: &'static str,
+        color: [f32; 3],
+        limits: Limits,
+    ) -> Result<Rgb, GltfError> {
         color.into_iter().try_for_each(|v| self.number(field, v, limits).map(drop))?;
         Ok(color.into())
     }
 
-    fn info(
+    /// The texture of `field`, if there is one, whose values mean `encoding`.
+    pub(super) fn info(
         &mut self,
         info: Option<&Info>,
         encoding: Encoding,
@@ -155,21 +167,24 @@ impl Reader<'_, '_> {
                 material.ior = Some(self.number("ior", json.ior, Limits::Ior)?);
             }
             "KHR_materials_unlit" => material.unlit = true,
+            "KHR_materials_pbrSpecularGlossiness" => specular_glossiness::read(json, self, material)?,
             "KHR_materials_specular" => {
                 let json: Specular = parse(json)?;
+                let (texture, color_texture) = (json.specular_texture, json.specular_color_texture);
                 material.specular = Some(GltfSpecular {
                     factor: self.number("specularFactor", json.specular_factor, Limits::Unit)?,
+                    texture: self.info(texture.as_ref(), Encoding::Linear, "specularTexture")?,
                     color: self.color(
                         "specularColorFactor",
                         json.specular_color_factor,
                         Limits::NotNegative,
                     )?,
+                    color_texture: self.info(
+                        color_texture.as_ref(),
+                        Encoding::Srgb,
+                        "specularColorTexture",
+                    )?,
                 });
-                self.skip(json.specular_texture.as_ref(), "KHR_materials_specular.specularTexture");
-                self.skip(
-                    json.specular_color_texture.as_ref(),
-                    "KHR_materials_specular.specularColorTexture",
-                );
             }
             "KHR_materials_clearcoat" => {
                 let json: Clearcoat = parse(json)?;
@@ -196,13 +211,17 @@ impl Reader<'_, '_> {
                 let json: Sheen = parse(json)?;
                 material.sheen = Some(GltfSheen {
                     color: self.color("sheenColorFactor", json.sheen_color_factor, Limits::Unit)?,
+                    color_texture: self.info(
+                        json.sheen_color_texture.as_ref(),
+                        Encoding::Srgb,
+                        "sheenColorTexture",
+                    )?,
                     roughness: self.number(
                         "sheenRoughnessFactor",
                         json.sheen_roughness_factor,
                         Limits::Unit,
                     )?,
                 });
-                self.skip(json.sheen_color_texture.as_ref(), "KHR_materials_sheen.sheenColorTexture");
                 self.skip(json.sheen_roughness_texture.as_ref(), "KHR_materials_sheen.sheenRoughnessTexture");
             }
             "KHR_materials_anisotropy" => {
@@ -266,7 +285,7 @@ impl Reader<'_, '_> {
 }
 
 /// An extension's object.
-fn parse<T: for<'de> Deserialize<'de>>(json: &Value) -> Result<T, GltfError> {
+pub(super) fn parse<T: for<'de> Deserialize<'de>>(json: &Value) -> Result<T, GltfError> {
     Ok(gltf::json::deserialize::from_value(json.clone())?)
 }
 

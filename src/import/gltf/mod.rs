@@ -4,40 +4,51 @@
 //! panic on malformed ones, so the container, the accessors and every reference are checked here; nothing in this room indexes
 //! by a number from the file without looking first.
 //!
-//! `container` opens the file, `buffers` and `uri` find the bytes, `accessor` reads them, `geometry`, `texture`, `material` and
+//! `container` opens the file, `buffers` and `uri` find the bytes, `meshopt` and `draco` unpack them, `accessor` reads them, `geometry`, `texture`, `material` and
 //! `nodes` make the parts of the scene, and this file puts them together.
 
 mod accessor;
+mod animation;
 mod buffers;
 mod container;
+mod deform;
+mod draco;
 mod error;
 mod geometry;
+mod instancing;
 mod material;
+mod meshopt;
 mod nodes;
+mod specular_glossiness;
+mod tangents;
 mod texture;
 mod uri;
+mod variants;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, DAffine3};
 use gltf::json::Root;
 use gltf::json::mesh::Semantic;
 
 pub use error::{GltfError, UriProblem};
 
 use self::accessor::Accessors;
+use self::animation::Pose;
 use self::buffers::{Buffers, lookup};
-use self::geometry::{Geometry, VertexAlpha};
+use self::deform::Deformation;
+use self::geometry::{Geometry, Part, VertexAlpha};
 use self::nodes::Placed;
 use self::texture::Textures;
+use self::variants::Variant;
 use crate::import::{Files, ImportOptions};
 use crate::record::Warning;
 use crate::scene::source::{AlphaMode, GltfMaterial, SourceMaterial};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Named, Scene};
 
 /// The most instances that a scene may have.
-const MAX_INSTANCES: u64 = 1 << 24;
+const MAX_INSTANCES: u64 = 1 << 22;
 
 /// The scene in `bytes`, the content of the file called `name`, with what was noticed.
 pub(super) fn import(
@@ -46,25 +57,37 @@ pub(super) fn import(
     bytes: &[u8],
     options: &ImportOptions,
 ) -> Result<(Scene<SourceMaterial>, Vec<Warning>), GltfError> {
-    let document = container::open(bytes)?;
+    let mut document = container::open(bytes)?;
+    let mut buffers = Buffers::load(&document, files)?;
+    buffers.decompress(&mut document.root)?;
+    draco::decompress(&mut document.root, &mut buffers)?;
     let root = &document.root;
     let mut warnings = unread_extensions(root, name);
-    let buffers = Buffers::load(&document, files)?;
-    let placed = nodes::place(root, name, &mut warnings)?;
+    let accessors = Accessors::new(root, &buffers);
+    let pose = Pose::sample(root, &accessors, options, name, &mut warnings)?;
+    let placed = nodes::place(root, &pose, name, &mut warnings)?;
+    let variant = Variant::choose(root, options.variant.as_deref())?;
 
     let mut scene = Scene::empty();
     let mut textures = Textures::new(root, &buffers, files);
-    let materials = read_materials(root, &mut textures)?;
+    let materials = read_materials(root, variant, &mut textures)?;
     let replaced;
     (scene.textures, scene.images, replaced) = textures.finish();
     warnings.extend(replaced);
 
-    let geometry = Geometry::new(Accessors::new(root, &buffers), name);
+    let geometry = Geometry::new(accessors, name);
+    let mut worlds = vec![None; root.nodes.len()];
+    for placed in &placed {
+        worlds[placed.index] = Some(placed.world_from_node);
+    }
     let mut stage = Stage {
         root,
+        pose,
+        worlds,
         file: name,
         geometry,
-        meshes: vec![None; root.meshes.len()],
+        variant,
+        meshes: BTreeMap::new(),
         materials,
         default_material: None,
         scene,
@@ -83,7 +106,7 @@ pub(super) fn import(
 /// A warning for each extension that the file uses without requiring it and that is not read. Conversion tells about materials'.
 fn unread_extensions(root: &Root, file: &str) -> Vec<Warning> {
     let used: BTreeSet<&str> = root.extensions_used.iter().map(String::as_str).collect();
-    let of_materials = |e: &str| e.starts_with("KHR_materials_") && e != "KHR_materials_variants";
+    let of_materials = |e: &str| e.starts_with("KHR_materials_");
     used.into_iter()
         .filter(|e| !container::EXTENSIONS.contains(e) && !of_materials(e))
         .map(|e| Warning::new(file, format!("the extension {e} is not read; what it adds is missing")))
@@ -91,12 +114,16 @@ fn unread_extensions(root: &Root, file: &str) -> Vec<Warning> {
 }
 
 /// All materials of the file, named by index where they have no name.
-fn read_materials(root: &Root, textures: &mut Textures) -> Result<Vec<Named<GltfMaterial>>, GltfError> {
+fn read_materials(
+    root: &Root,
+    variant: Variant,
+    textures: &mut Textures,
+) -> Result<Vec<Named<GltfMaterial>>, GltfError> {
+    let mut colored = BTreeSet::new();
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let colored: BTreeSet<usize> = primitives
-        .filter(|p| geometry::attribute(p, Semantic::Colors(0)).is_some())
-        .filter_map(|p| p.material.map(|m| m.value()))
-        .collect();
+    for primitive in primitives.filter(|p| geometry::attribute(p, Semantic::Colors(0)).is_some()) {
+        colored.extend(variant.material(primitive)?);
+    }
     let read = |(index, json): (usize, &gltf::json::Material)| {
         let name = json.name.clone().unwrap_or_else(|| format!("material_{index}"));
         let material = material::read(json, &name, index, colored.contains(&index), textures)?;
@@ -105,13 +132,20 @@ fn read_materials(root: &Root, textures: &mut Textures) -> Result<Vec<Named<Gltf
     root.materials.iter().enumerate().map(read).collect()
 }
 
+/// The meshes and materials of a mesh's primitives.
+type Parts = Vec<(MeshId, MaterialId)>;
+
 /// The scene as it is put together.
 struct Stage<'a> {
     root: &'a Root,
     file: &'a str,
     geometry: Geometry<'a>,
-    /// What became of each mesh of the file: its primitives' meshes and materials.
-    meshes: Vec<Option<Vec<(MeshId, MaterialId)>>>,
+    variant: Variant,
+    pose: Pose,
+    /// Where each node of the file stands, if the scene has it.
+    worlds: Vec<Option<DAffine3>>,
+    /// What became of each mesh of the file, for itself or for a node that deforms it: its primitives' meshes and materials.
+    meshes: BTreeMap<(usize, Option<usize>), Parts>,
     materials: Vec<Named<GltfMaterial>>,
     default_material: Option<MaterialId>,
     scene: Scene<SourceMaterial>,
@@ -122,7 +156,7 @@ impl Stage<'_> {
     /// Puts what `placed` carries into the scene.
     fn place(&mut self, placed: &Placed, options: &ImportOptions) -> Result<(), GltfError> {
         let element = format!("nodes[{}]", placed.index);
-        if let Some(mesh) = placed.node.mesh {
+        if let Some(mesh) = placed.node.mesh.filter(|_| placed.visible) {
             self.place_mesh(mesh.value(), placed, &element)?;
         }
         if let Some(index) = placed.node.camera {
@@ -133,7 +167,7 @@ impl Stage<'_> {
             self.scene.cameras.push(Named::new(name, camera));
         }
         let extension = placed.node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
-        if let Some(extension) = extension {
+        if let Some(extension) = extension.filter(|_| placed.visible) {
             let lights =
                 self.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map(|e| &e.lights);
             let index = extension.light.value();
@@ -147,31 +181,86 @@ impl Stage<'_> {
     }
 
     fn place_mesh(&mut self, index: usize, placed: &Placed, element: &str) -> Result<(), GltfError> {
-        let m = placed.world_from_node;
-        if m.matrix3.determinant() == 0.0 {
-            let message = "its transform has no inverse (a scale of 0); its mesh is left out";
-            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
-            return Ok(());
-        }
-        if placed.node.skin.is_some() {
-            let message = "skins are not applied: the mesh is shown as it was bound, where the node stands";
-            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
-        }
-        let world_from_object = Affine3A::from_cols_array(&m.to_cols_array().map(|v| v as f32));
-        let parts = self.read_mesh(index, element)?;
-        if self.scene.instances.len() as u64 + parts.len() as u64 > MAX_INSTANCES {
-            return Err(GltfError::TooMany { what: "instances", limit: MAX_INSTANCES });
-        }
-        for (mesh, material) in parts {
-            self.scene.instances.push(Instance { name: placed.name(), mesh, material, world_from_object });
+        let (deformer, deformation) = self.deformation(index, placed, element)?;
+        let world = match deformation.joints {
+            // The joints alone say where a skinned mesh stands.
+            Some(_) => vec![Affine3A::IDENTITY],
+            None => self.instances(placed, element)?,
+        };
+        let parts = if world.is_empty() {
+            Vec::new()
+        } else {
+            self.read_mesh(index, deformer, &deformation, element)?
+        };
+        self.check_instances(world.len().saturating_mul(parts.len()))?;
+        for world_from_object in world {
+            for &(mesh, material) in &parts {
+                let name = placed.name();
+                self.scene.instances.push(Instance { name, mesh, material, world_from_object });
+            }
         }
         Ok(())
     }
 
-    /// The meshes and materials of `meshes[index]`, read when it is first asked for.
-    fn read_mesh(&mut self, index: usize, element: &str) -> Result<Vec<(MeshId, MaterialId)>, GltfError> {
+    /// Where the node's mesh stands: once, or as EXT_mesh_gpu_instancing says.
+    fn instances(&mut self, placed: &Placed, element: &str) -> Result<Vec<Affine3A>, GltfError> {
+        let instances = instancing::transforms(placed.node, element, self.geometry.accessors())?;
+        let instances = instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
+        let count = instances.len();
+        self.check_instances(count)?;
+        let world: Vec<Affine3A> = instances
+            .into_iter()
+            .map(|node_from_object| placed.world_from_node * node_from_object)
+            .filter(|m| m.matrix3.determinant() != 0.0)
+            .map(|m| Affine3A::from_cols_array(&m.to_cols_array().map(|v| v as f32)))
+            .collect();
+        if world.len() < count {
+            let message = "its transform has no inverse (a scale of 0); its mesh is left out";
+            self.warnings.push(Warning::new(format!("{}: {element}", self.file), message));
+        }
+        Ok(world)
+    }
+
+    /// Whether there may be `more` instances.
+    fn check_instances(&self, more: usize) -> Result<(), GltfError> {
+        match (self.scene.instances.len() as u64).saturating_add(more as u64) {
+            0..=MAX_INSTANCES => Ok(()),
+            _ => Err(GltfError::TooMany { what: "instances", limit: MAX_INSTANCES }),
+        }
+    }
+
+    /// How the node `placed` deforms `meshes[index]`, and the node's index if the mesh is not as other nodes show it.
+    fn deformation(
+        &self,
+        index: usize,
+        placed: &Placed,
+        element: &str,
+    ) -> Result<(Option<usize>, Deformation), GltfError> {
+        let mesh = lookup(&self.root.meshes, index, element, "meshes")?;
+        let posed = self.pose.of(placed.index).and_then(|pose| pose.weights.as_ref());
+        let own = posed.or(placed.node.weights.as_ref());
+        let weights = own.or(mesh.weights.as_ref()).cloned().unwrap_or_default();
+        let joints = match placed.node.skin {
+            Some(skin) => {
+                let accessors = self.geometry.accessors();
+                Some(deform::joints(self.root, skin.value(), element, &self.worlds, accessors)?)
+            }
+            None => None,
+        };
+        let deformer = (own.is_some() || joints.is_some()).then_some(placed.index);
+        Ok((deformer, Deformation { weights, joints }))
+    }
+
+    /// The meshes and materials of `meshes[index]` as `deformation` moves it, read when it is first asked for.
+    fn read_mesh(
+        &mut self,
+        index: usize,
+        deformer: Option<usize>,
+        deformation: &Deformation,
+        element: &str,
+    ) -> Result<Parts, GltfError> {
         let json = lookup(&self.root.meshes, index, element, "meshes")?;
-        if let Some(parts) = &self.meshes[index] {
+        if let Some(parts) = self.meshes.get(&(index, deformer)) {
             return Ok(parts.clone());
         }
         let mesh_name = json.name.clone().unwrap_or_else(|| format!("mesh_{index}"));
@@ -181,19 +270,22 @@ impl Stage<'_> {
             let name =
                 if json.primitives.len() == 1 { mesh_name.clone() } else { format!("{mesh_name}/{i}") };
             let colored = geometry::attribute(primitive, Semantic::Colors(0)).is_some();
-            let material = self.material_of(primitive.material.map(|m| m.value()), colored, &element)?;
-            let alpha = match self.materials[material.0 as usize].item.alpha_mode {
+            let material = self.material_of(self.variant.material(primitive)?, colored, &element)?;
+            let source = &self.materials[material.0 as usize].item;
+            let tangents = source.tangent_set();
+            let alpha = match source.alpha_mode {
                 AlphaMode::Opaque => VertexAlpha::Ignore,
                 AlphaMode::Mask { .. } | AlphaMode::Blend => VertexAlpha::Keep,
             };
-            let mesh = self.geometry.read(primitive, &element, name, alpha, &mut self.warnings)?;
+            let part = Part { primitive, element: &element, name, alpha, tangents, deformation };
+            let mesh = self.geometry.read(part, &mut self.warnings)?;
             if let Some(mesh) = mesh {
                 let id = MeshId(self.scene.meshes.len() as u32);
                 self.scene.meshes.push(mesh);
                 parts.push((id, material));
             }
         }
-        self.meshes[index] = Some(parts.clone());
+        self.meshes.insert((index, deformer), parts.clone());
         Ok(parts)
     }
 

@@ -7,6 +7,7 @@ use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
+use super::animation::{NodePose, Pose};
 use super::buffers::lookup;
 use super::error::GltfError;
 use crate::import::{ImportOptions, LightUnits};
@@ -26,6 +27,8 @@ pub(super) struct Placed<'a> {
     pub(super) node: &'a Node,
     /// Its own space to the world.
     pub(super) world_from_node: DAffine3,
+    /// Whether its mesh and its light are there (KHR_node_visibility); cameras always are.
+    pub(super) visible: bool,
 }
 
 impl Placed<'_> {
@@ -36,31 +39,43 @@ impl Placed<'_> {
 }
 
 /// All nodes of the default scene (the first if none is), parents before children, in the file's order. A file without scenes is
-/// taken as one scene of all nodes without parents.
+/// taken as one scene of all nodes without parents. An animation's `pose` moves them.
 pub(super) fn place<'a>(
     root: &'a Root,
+    pose: &Pose,
     file: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<Placed<'a>>, GltfError> {
     let mut visited = vec![false; root.nodes.len()];
     // A stack of our own: the depth of the hierarchy is the file's choice.
-    let mut waiting: Vec<(usize, DAffine3, String)> =
-        roots(root)?.into_iter().rev().map(|(index, element)| (index, DAffine3::IDENTITY, element)).collect();
+    let mut waiting: Vec<(usize, DAffine3, bool, String)> = roots(root)?
+        .into_iter()
+        .rev()
+        .map(|(index, element)| (index, DAffine3::IDENTITY, true, element))
+        .collect();
     let mut placed = Vec::new();
-    while let Some((index, world_from_parent, referrer)) = waiting.pop() {
+    while let Some((index, world_from_parent, parent_visible, referrer)) = waiting.pop() {
         let node = lookup(&root.nodes, index, &referrer, "nodes")?;
         if std::mem::replace(&mut visited[index], true) {
             return Err(GltfError::Tree { node: index });
         }
-        let world_from_node = world_from_parent * local_transform(node, index, file, warnings)?;
+        let world_from_node =
+            world_from_parent * local_transform(node, index, pose.of(index), file, warnings)?;
         if !Affine3A::from_cols_array(&world_from_node.to_cols_array().map(|v| v as f32)).is_finite() {
             return Err(transform_error(index, "a world transform within the range of floats"));
         }
-        placed.push(Placed { index, node, world_from_node });
+        let visible = parent_visible && is_visible(node);
+        placed.push(Placed { index, node, world_from_node, visible });
         let children = node.children.iter().flatten().rev();
-        waiting.extend(children.map(|c| (c.value(), world_from_node, format!("nodes[{index}]"))));
+        waiting.extend(children.map(|c| (c.value(), world_from_node, visible, format!("nodes[{index}]"))));
     }
     Ok(placed)
+}
+
+/// Whether KHR_node_visibility leaves the node visible, its ancestors aside.
+fn is_visible(node: &Node) -> bool {
+    let extension = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
+    extension.and_then(|e| e.get("visible")?.as_bool()).unwrap_or(true)
 }
 
 /// The scene's own nodes, each with what refers to it.
@@ -84,10 +99,11 @@ fn transform_error(index: usize, expected: &'static str) -> GltfError {
     GltfError::Invalid { element: format!("nodes[{index}]"), property: "transform", expected }
 }
 
-/// The transform of a node in its parent: its matrix, or T·R·S.
+/// The transform of a node in its parent: its matrix, or T·R·S, each as the pose says or else the node.
 fn local_transform(
     node: &Node,
     index: usize,
+    pose: Option<&NodePose>,
     file: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<DAffine3, GltfError> {
@@ -103,12 +119,12 @@ fn local_transform(
         return Ok(DAffine3::from_mat4(matrix));
     }
     let vector = |v: Option<[f32; 3]>, default| v.map_or(default, |v| Vec3::from(v).as_dvec3());
-    let scale = vector(node.scale, DVec3::ONE);
-    let translation = vector(node.translation, DVec3::ZERO);
-    let rotation = match node.rotation {
+    let scale = vector(pose.and_then(|p| p.scale).or(node.scale), DVec3::ONE);
+    let translation = vector(pose.and_then(|p| p.translation).or(node.translation), DVec3::ZERO);
+    let rotation = match pose.and_then(|p| p.rotation).or(node.rotation.map(|q| q.0)) {
         None => DQuat::IDENTITY,
         Some(q) => {
-            let q = DQuat::from_array(q.0.map(f64::from));
+            let q = DQuat::from_array(q.map(f64::from));
             let length = q.length();
             if !length.is_finite() || length == 0.0 {
                 return Err(transform_error(index, "a rotation that is a unit quaternion"));

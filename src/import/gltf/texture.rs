@@ -9,6 +9,7 @@ use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::NormalTexture;
 use gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
+use serde::Deserialize;
 
 use super::buffers::{Buffers, lookup, read_file, resolve};
 use super::error::GltfError;
@@ -18,7 +19,7 @@ use crate::import::images::decode_image;
 use crate::math::Real;
 use crate::record::Warning;
 use crate::scene::material::{TextureChannel, TextureMap};
-use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
+use crate::scene::texture::{Encoding, Pixels, Texel, TexelFilter, Wrap};
 use crate::scene::{Image, ImageId, Texture, TextureId};
 
 /// The most bytes that all decoded images of a file may take together.
@@ -48,6 +49,12 @@ impl Slot {
         };
         Ok(Self { index: texture.index.value(), tex_coord: texture.tex_coord, transform })
     }
+}
+
+/// KHR_texture_basisu and EXT_texture_webp.
+#[derive(Deserialize)]
+struct Source {
+    source: usize,
 }
 
 /// The textures of a file, made as materials ask for them.
@@ -107,6 +114,36 @@ impl<'a> Textures<'a> {
         Ok(TextureMap { texture, channel: TextureChannel::R, uv_set, texture_from_uv })
     }
 
+    /// Columns and rows of a texture that was made.
+    pub(super) fn size(&self, id: TextureId) -> (u32, u32) {
+        let image = &self.images[self.textures[id.0 as usize].image.0 as usize];
+        (image.width, image.height)
+    }
+
+    /// The value at `uv` of a texture that was made.
+    pub(super) fn sample(&self, id: TextureId, uv: Vec2) -> Texel {
+        let texture = &self.textures[id.0 as usize];
+        texture.sample(&self.images[texture.image.0 as usize], uv)
+    }
+
+    /// A texture of `image`, whose values mean `encoding`, with the sampler of a texture that was made.
+    pub(super) fn add(&mut self, image: Image, encoding: Encoding, like: TextureId) -> TextureId {
+        let image_id = ImageId(self.images.len() as u32);
+        self.images.push(Arc::new(image));
+        let id = TextureId(self.textures.len() as u32);
+        self.textures.push(Texture { image: image_id, encoding, ..self.textures[like.0 as usize].clone() });
+        id
+    }
+
+    /// Counts what images take before more is made of them.
+    pub(super) fn count_decoded(&mut self, bytes: u64) -> Result<(), GltfError> {
+        self.decoded = self.decoded.saturating_add(bytes);
+        if self.decoded > MAX_DECODED {
+            return Err(GltfError::TooMany { what: "bytes of decoded images", limit: MAX_DECODED });
+        }
+        Ok(())
+    }
+
     fn texture(&mut self, index: usize, encoding: Encoding, element: &str) -> Result<TextureId, GltfError> {
         let key = (index, encoding == Encoding::Srgb);
         if let Some(&id) = self.by_use.get(&key) {
@@ -114,12 +151,16 @@ impl<'a> Textures<'a> {
         }
         let json = lookup(&self.root.textures, index, element, "textures")?;
         let name = format!("textures[{index}]");
-        let source = json.source.value();
+        let others = json.extensions.as_ref().map(|e| &e.others);
+        // The extension's image comes first: the other one is for those who can't read it.
+        let of_extension =
+            |o: &'a serde_json::Map<_, _>| o.get("KHR_texture_basisu").or_else(|| o.get("EXT_texture_webp"));
+        let source = match others.and_then(of_extension) {
+            Some(json) => gltf::json::deserialize::from_value::<Source>(json.clone())?.source,
+            None => json.source.value(),
+        };
         if source == u32::MAX as usize {
-            let others = json.extensions.as_ref().map(|e| &e.others);
-            for extension in
-                ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds", "EXT_texture_avif"]
-            {
+            for extension in ["MSFT_texture_dds", "EXT_texture_avif"] {
                 if others.is_some_and(|o| o.contains_key(extension)) {
                     return Err(GltfError::Extension { element: name, extension });
                 }
@@ -159,14 +200,11 @@ impl<'a> Textures<'a> {
             (None, None) => return Err(GltfError::Missing { element, property: "uri or bufferView" }),
         };
         self.warnings.extend(replaced);
-        self.decoded = self.decoded.saturating_add(match &image.pixels {
+        self.count_decoded(match &image.pixels {
             Pixels::U8(v) => v.len() as u64,
             Pixels::U16(v) => v.len() as u64 * 2,
             Pixels::F32(v) => v.len() as u64 * 4,
-        });
-        if self.decoded > MAX_DECODED {
-            return Err(GltfError::TooMany { what: "bytes of decoded images", limit: MAX_DECODED });
-        }
+        })?;
         let id = ImageId(self.images.len() as u32);
         self.images.push(Arc::new(image));
         self.by_source.insert(index, id);

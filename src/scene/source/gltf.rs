@@ -56,6 +56,8 @@ pub struct GltfMaterial {
     pub diffuse_transmission: Option<GltfDiffuseTransmission>,
     /// KHR_materials_unlit: the surface shows its base colour whatever the light.
     pub unlit: bool,
+    /// Whether base colour, metallic and roughness were computed from KHR_materials_pbrSpecularGlossiness.
+    pub specular_glossiness: bool,
     /// What the file says about the material that is not read: extensions and textures of extensions, by name.
     pub unread: Vec<String>,
 }
@@ -75,13 +77,17 @@ pub enum AlphaMode {
     Blend,
 }
 
-/// KHR_materials_specular, its constant factors.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// KHR_materials_specular.
+#[derive(Clone, Debug, PartialEq)]
 pub struct GltfSpecular {
     /// `specularFactor`, in [0, 1].
     pub factor: f32,
+    /// `specularTexture`: its alpha multiplies the factor.
+    pub texture: Option<TextureMap>,
     /// `specularColorFactor`, not negative, linear.
     pub color: Rgb,
+    /// `specularColorTexture`, sRGB.
+    pub color_texture: Option<TextureMap>,
 }
 
 /// KHR_materials_clearcoat.
@@ -95,11 +101,13 @@ pub struct GltfClearcoat {
     pub roughness: f32,
 }
 
-/// KHR_materials_sheen, its constant factors.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// KHR_materials_sheen.
+#[derive(Clone, Debug, PartialEq)]
 pub struct GltfSheen {
     /// `sheenColorFactor`, in [0, 1], linear.
     pub color: Rgb,
+    /// `sheenColorTexture`, sRGB.
+    pub color_texture: Option<TextureMap>,
     /// `sheenRoughnessFactor`, in [0, 1].
     pub roughness: f32,
 }
@@ -174,21 +182,32 @@ impl Default for GltfMaterial {
             volume: None,
             diffuse_transmission: None,
             unlit: false,
+            specular_glossiness: false,
             unread: Vec::new(),
         }
     }
 }
 
 impl GltfMaterial {
+    /// The set of texture coordinates that the surface's tangents follow, if the material depends on them.
+    pub fn tangent_set(&self) -> Option<u32> {
+        let normal = self.normal_texture.as_ref().map(|map| map.uv_set);
+        normal.or_else(|| self.anisotropy.map(|_| 0))
+    }
+
     /// Every texture that is read, with the field it stands in.
     pub fn textures(&self) -> impl Iterator<Item = (&'static str, &TextureMap)> {
         let coat = self.clearcoat.as_ref().and_then(|c| c.texture.as_ref());
         let diffuse = self.diffuse_transmission.as_ref();
+        let specular = self.specular.as_ref();
         [
             ("baseColorTexture", self.base_color_texture.as_ref()),
             ("metallicRoughnessTexture", self.metallic_roughness_texture.as_ref()),
             ("normalTexture", self.normal_texture.as_ref()),
             ("emissiveTexture", self.emissive_texture.as_ref()),
+            ("specularTexture", specular.and_then(|s| s.texture.as_ref())),
+            ("specularColorTexture", specular.and_then(|s| s.color_texture.as_ref())),
+            ("sheenColorTexture", self.sheen.as_ref().and_then(|s| s.color_texture.as_ref())),
             ("clearcoatTexture", coat),
             ("transmissionTexture", self.transmission.as_ref().and_then(|t| t.texture.as_ref())),
             ("diffuseTransmissionTexture", diffuse.and_then(|d| d.texture.as_ref())),
