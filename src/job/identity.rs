@@ -139,6 +139,19 @@ mod tests {
         for (other, other_key) in [id(&job(0.6), b"scene", b"one"), id(&job(0.5), b"changed", b"one")] {
             assert!(other != identity && other_key != key);
         }
+        let options = |time| ImportOptions { time, ..ImportOptions::default() };
+        let posed = |time| {
+            let converted = ConvertOptions::default();
+            identify(
+                &job(0.5),
+                &[&file(b"scene")],
+                (&options(time), &converted),
+                &job(0.5).settings,
+                &build(b"one"),
+            )
+            .1
+        };
+        assert!(posed(None) == key && posed(Some(0.0)) != key && posed(Some(0.5)) != posed(Some(0.0)));
         let mut seeded = job(0.5);
         seeded.settings.seed = 7;
         assert_ne!(id(&seeded, b"scene", b"one").1, key);
