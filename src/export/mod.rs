@@ -36,7 +36,7 @@ pub enum ExportError {
         cause: std::io::Error,
     },
     /// A folder without a scene.
-    #[error("{}: there is no scene in this folder; known are .gltf, .glb, .obj, .yaml and .yml, each also with .gz", path.display())]
+    #[error("{}: there is no scene in this folder; known are .gltf, .glb, .obj, .yaml and .yml, those but the last two also with .gz or .zst", path.display())]
     NoScene {
         /// The folder.
         path: PathBuf,

@@ -29,7 +29,7 @@ use crate::record::Warning;
 use crate::scene::Scene;
 use crate::scene::source::SourceMaterial;
 
-/// The most that a `.gz` may unpack to, in bytes.
+/// The most that a packed file may unpack to, in bytes.
 const MAX_UNPACKED: u64 = 4 << 30;
 
 /// A scene as its file describes it.
@@ -75,7 +75,7 @@ pub enum LightUnits {
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The file's name has an ending that no importer reads.
-    #[error("{}: no importer for this kind of file; known are .gltf, .glb and .obj, each also with .gz, and .yaml and .yml", path.display())]
+    #[error("{}: no importer for this kind of file; known are .gltf, .glb and .obj, each also with .gz or .zst, and .yaml and .yml", path.display())]
     UnknownExtension {
         /// The file.
         path: PathBuf,
@@ -89,7 +89,7 @@ pub enum ImportError {
     /// The scene's file can't be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A `.gz` that is damaged.
+    /// A `.gz` or `.zst` that is damaged.
     #[error("{} cannot be unpacked: {cause}", path.display())]
     Unpack {
         /// The file.
@@ -97,7 +97,7 @@ pub enum ImportError {
         /// The decoder's reason.
         cause: std::io::Error,
     },
-    /// A `.gz` that unpacks to more than any scene needs.
+    /// A packed file that unpacks to more than any scene needs.
     #[error("{} unpacks to more than {MAX_UNPACKED} bytes", path.display())]
     UnpackedTooLarge {
         /// The file.
@@ -127,7 +127,7 @@ pub enum ImportError {
     },
 }
 
-/// The scene in the file `path`, a `.gltf`, `.glb`, `.obj`, `.yaml` or `.yml`, or one of these packed as `.gz`.
+/// The scene in the file `path`, a `.gltf`, `.glb`, `.obj`, `.yaml` or `.yml`, or one of the first three packed as `.gz` or `.zst`.
 ///
 /// Positions of the result are finite, indices in range, triangles not degenerate, normals of unit length and names unique;
 /// what had to be mended is in the warnings. Every vertex belongs to a triangle, and every instance has triangles.
@@ -182,8 +182,11 @@ fn import_with(
     bytes: &[u8],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let packed = name.to_ascii_lowercase().ends_with(".gz");
-    let bytes = if packed { Cow::Owned(gunzip(bytes, path, MAX_UNPACKED)?) } else { Cow::Borrowed(bytes) };
+    let (_, packing) = Packing::of(name);
+    let bytes = match packing {
+        Some(packing) => Cow::Owned(packing.unpack(bytes, path, MAX_UNPACKED)?),
+        None => Cow::Borrowed(bytes),
+    };
     let mut digests = None;
     let (mut scene, mut warnings) = match dialect {
         Dialect::Gltf => gltf::import(&mut files, name, &bytes, options)
@@ -217,28 +220,55 @@ enum Dialect {
 impl Dialect {
     /// The kind of the file called `name`, by its ending.
     fn of(name: &str) -> Option<Self> {
-        let name = name.to_ascii_lowercase();
-        let unpacked = name.strip_suffix(".gz").unwrap_or(&name);
-        match unpacked.rsplit_once('.')?.1 {
+        let (unpacked, packing) = Packing::of(name);
+        match unpacked.to_ascii_lowercase().rsplit_once('.')?.1 {
             "gltf" | "glb" => Some(Self::Gltf),
             "obj" => Some(Self::Obj),
-            "yaml" | "yml" if unpacked == name => Some(Self::Aris),
+            "yaml" | "yml" if packing.is_none() => Some(Self::Aris),
             _ => None,
         }
     }
 }
 
-/// `packed` unpacked, at most `limit` bytes.
-fn gunzip(packed: &[u8], path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
-    let mut bytes = Vec::new();
-    flate2::read::MultiGzDecoder::new(packed)
-        .take(limit.saturating_add(1))
-        .read_to_end(&mut bytes)
-        .map_err(|cause| ImportError::Unpack { path: path.to_owned(), cause })?;
-    if bytes.len() as u64 > limit {
-        return Err(ImportError::UnpackedTooLarge { path: path.to_owned() });
+/// How a file is packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Packing {
+    Gzip,
+    Zstandard,
+}
+
+impl Packing {
+    /// The name without the packing's ending, and the packing.
+    fn of(name: &str) -> (&str, Option<Self>) {
+        let stem = |ending: &str| {
+            let at = name.len().checked_sub(ending.len())?;
+            name.get(at..)?.eq_ignore_ascii_case(ending).then(|| &name[..at])
+        };
+        match (stem(".gz"), stem(".zst")) {
+            (Some(stem), _) => (stem, Some(Self::Gzip)),
+            (_, Some(stem)) => (stem, Some(Self::Zstandard)),
+            _ => (name, None),
+        }
     }
-    Ok(bytes)
+
+    /// `packed` unpacked, at most `limit` bytes.
+    fn unpack(self, packed: &[u8], path: &Path, limit: u64) -> Result<Vec<u8>, ImportError> {
+        let failed = |cause| ImportError::Unpack { path: path.to_owned(), cause };
+        let most = limit.saturating_add(1);
+        let mut bytes = Vec::new();
+        match self {
+            Self::Gzip => flate2::read::MultiGzDecoder::new(packed).take(most).read_to_end(&mut bytes),
+            Self::Zstandard => ruzstd::StreamingDecoder::new(packed)
+                .map_err(|cause| failed(std::io::Error::other(cause)))?
+                .take(most)
+                .read_to_end(&mut bytes),
+        }
+        .map_err(failed)?;
+        if bytes.len() as u64 > limit {
+            return Err(ImportError::UnpackedTooLarge { path: path.to_owned() });
+        }
+        Ok(bytes)
+    }
 }
 
 #[cfg(test)]
@@ -253,6 +283,7 @@ mod tests {
             ("a.glb", Some(Dialect::Gltf)),
             ("a.GLTF", Some(Dialect::Gltf)),
             ("a.b.obj.gz", Some(Dialect::Obj)),
+            ("kitchen.OBJ.ZST", Some(Dialect::Obj)),
             ("cbox.yml", Some(Dialect::Aris)),
             ("a.gz", None),
             ("cbox.yaml.gz", None),
@@ -271,10 +302,19 @@ mod tests {
         packer.write_all(&[0; 100_000]).unwrap();
         let packed = packer.finish().unwrap();
         let path = Path::new("x.glb.gz");
-        assert_eq!(gunzip(&packed, path, 100_000).unwrap().len(), 100_000);
-        assert!(matches!(gunzip(&packed, path, 99_999), Err(ImportError::UnpackedTooLarge { .. })));
+        let gunzip = |packed: &[u8], limit| Packing::Gzip.unpack(packed, path, limit);
+        assert_eq!(gunzip(&packed, 100_000).unwrap().len(), 100_000);
+        assert!(matches!(gunzip(&packed, 99_999), Err(ImportError::UnpackedTooLarge { .. })));
         let half = &packed[..packed.len() / 2];
-        assert!(matches!(gunzip(half, path, 100_000), Err(ImportError::Unpack { .. })));
+        assert!(matches!(gunzip(half, 100_000), Err(ImportError::Unpack { .. })));
+        // A frame of one block that repeats a zero 100,000 times: RFC 8878, section 3.1.1.2.
+        let repeated = [0x28, 0xb5, 0x2f, 0xfd, 0xa0, 0xa0, 0x86, 0x01, 0x00, 0x03, 0x35, 0x0c, 0x00];
+        let unzstd = |packed: &[u8], limit| Packing::Zstandard.unpack(packed, Path::new("x.obj.zst"), limit);
+        assert_eq!(unzstd(&repeated, 100_000).unwrap(), vec![0; 100_000]);
+        assert!(matches!(unzstd(&repeated, 99_999), Err(ImportError::UnpackedTooLarge { .. })));
+        for damaged in [&repeated[..8], &packed, b""] {
+            assert!(matches!(unzstd(damaged, 100_000), Err(ImportError::Unpack { .. })));
+        }
     }
 
     #[test]
