@@ -64,19 +64,11 @@ impl Parameter {
         Self::F90,
     ];
 
-    /// The ten of Burley 2012, in the report's order, which is that of [`Self::ALL`].
-    pub const BURLEY_2012: [Self; 10] = [
-        Self::Subsurface,
-        Self::Metallic,
-        Self::Specular,
-        Self::SpecularTint,
-        Self::Roughness,
-        Self::Anisotropic,
-        Self::Sheen,
-        Self::SheenTint,
-        Self::Clearcoat,
-        Self::ClearcoatGloss,
-    ];
+    /// The ten of Burley 2012, in the report's order.
+    pub const BURLEY_2012: [Self; 10] = match Self::ALL.first_chunk() {
+        Some(ten) => *ten,
+        None => unreachable!(),
+    };
 
     /// The name in files and paths.
     pub const fn name(self) -> &'static str {
@@ -357,7 +349,7 @@ mod tests {
 
     #[test]
     fn names_and_parameters_are_one_to_one() {
-        assert_eq!(Parameter::ALL[..10], Parameter::BURLEY_2012);
+        assert_eq!(Parameter::BURLEY_2012[9], Parameter::ClearcoatGloss);
         for (i, p) in Parameter::ALL.into_iter().enumerate() {
             assert_eq!(Parameter::from_name(p.name()), Some(p));
             assert_eq!(p as usize, i);
