@@ -70,7 +70,7 @@ fn value(text: &str) -> Option<Value> {
 mod tests {
     use super::*;
     use crate::disney::Parameter;
-    use crate::library::set;
+    use crate::manifest::edit::set_material;
     use crate::scene::Material;
 
     fn values(text: &str) -> Vec<Value> {
@@ -102,9 +102,9 @@ mod tests {
     #[test]
     fn a_value_out_of_range_is_told_by_the_field_s_name() {
         let mut material = Material::default();
-        set(&mut material, MaterialField::Roughness, &Value::Number(0.25)).unwrap();
+        set_material(&mut material, MaterialField::Roughness, &Value::Number(0.25)).unwrap();
         assert_eq!(material.scalar(Parameter::Roughness).constant(), Some(0.25));
-        let error = set(&mut material, MaterialField::Roughness, &Value::Number(1.5)).unwrap_err();
+        let error = set_material(&mut material, MaterialField::Roughness, &Value::Number(1.5)).unwrap_err();
         assert_eq!(error.to_string(), "`roughness` is 1.5, but must be a number in [0, 1]");
         assert_eq!(material.scalar(Parameter::Roughness).constant(), Some(0.25), "the rest stays");
     }

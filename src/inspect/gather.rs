@@ -7,7 +7,8 @@ use super::{Edit, InspectError, Subject};
 use crate::convert::{ConvertOptions, to_disney};
 use crate::disney::{DiffuseModel, Masking, Model};
 use crate::import::{ImportOptions, import};
-use crate::library::{Library, set};
+use crate::library::Library;
+use crate::manifest::edit::set_material;
 use crate::manifest::nearest::nearest;
 use crate::record::{Value, Warning};
 use crate::scene::{Material, Named, Scene};
@@ -93,7 +94,7 @@ pub fn gather(
                     edited.item.diffuse = diffuse.unwrap_or(edited.item.diffuse);
                 }
                 for (edit, value) in variant {
-                    set(&mut edited.item, edit.field, value).map_err(InspectError::Edit)?;
+                    set_material(&mut edited.item, edit.field, value).map_err(InspectError::Edit)?;
                 }
                 subjects.push(Subject::new(scene, &edited)?);
             }

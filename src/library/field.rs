@@ -1,12 +1,7 @@
-//! Fields of materials by the names that people use, outside a scene.
+//! Fields of materials by the names that people use.
 
-use std::path::Path;
-
-use crate::manifest::edit::{self, BoxedError, EditError, MaterialField};
+use crate::manifest::edit::{EditError, MaterialField};
 use crate::manifest::nearest::nearest;
-use crate::record::Value;
-use crate::scene::{Image, Material, Named, Scene};
-use crate::settings::RenderSettings;
 
 /// The field of that name, in snake_case, camelCase or as Aris calls it.
 ///
@@ -30,29 +25,5 @@ pub fn field(name: &str) -> Result<MaterialField, EditError> {
             nearest: nearest(name, known.iter().copied()),
             known,
         }
-    })
-}
-
-/// Sets a field of a material.
-///
-/// # Errors
-/// If the value does not suit the field; messages call it by its name alone.
-pub fn set(material: &mut Material, field: MaterialField, value: &Value) -> Result<(), EditError> {
-    let mut scene = Scene::empty();
-    scene.materials.push(Named::new("material", std::mem::take(material)));
-    let path = format!("material.material.{}", field.name());
-    let mut no_image = |_: &Path| -> Result<Image, BoxedError> { Err("a material has no image".into()) };
-    let result = edit::apply(&mut scene, &mut RenderSettings::default(), &path, value, &mut no_image);
-    if let Some(edited) = scene.materials.pop() {
-        *material = edited.item;
-    }
-    result.map_err(|error| match error {
-        EditError::Value { found, expected, .. } => {
-            EditError::Value { path: field.name().to_owned(), found, expected }
-        }
-        EditError::NotApplicable { why, .. } => {
-            EditError::NotApplicable { path: field.name().to_owned(), why }
-        }
-        other => other,
     })
 }

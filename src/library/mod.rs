@@ -25,7 +25,7 @@ mod tests;
 mod textures;
 mod write;
 
-pub use field::{field, set};
+pub use field::field;
 pub use keys::of as aris_key;
 pub use read::Library;
 pub use textures::TextureFiles;

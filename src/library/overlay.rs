@@ -6,12 +6,12 @@ use std::sync::Arc;
 use glam::Affine2;
 
 use super::read::{Entry, form};
-use super::{Library, LibraryError, field, keys, set};
+use super::{Library, LibraryError, field, keys};
 use crate::color::Rgb;
 use crate::disney::Parameter;
 use crate::import::yaml::{self, Node, Place};
 use crate::import::{FileDigest, Files, read_image};
-use crate::manifest::edit::MaterialField;
+use crate::manifest::edit::{MaterialField, set_material};
 use crate::manifest::nearest::nearest;
 use crate::record::{Value, Warning};
 use crate::scene::material::{NormalMap, Param, ShadingFrame, Sides, TextureChannel, TextureMap};
@@ -86,7 +86,7 @@ impl Overlay<'_> {
                 }
                 let value = value(node)
                     .ok_or_else(|| form(&node.place, &format!("`{key}` must be {}", field.expects())))?;
-                set(material, field, &value).map_err(|cause| at(&node.place, cause))
+                set_material(material, field, &value).map_err(|cause| at(&node.place, cause))
             }
         }
     }

@@ -76,7 +76,7 @@ pub fn check_value(path: &str, value: &Value) -> Result<Target, EditError> {
         Target::Render(field) => render::set(&mut RenderSettings::default(), *field, value),
         Target::Scene => value::text(value).map(drop),
     };
-    checked.map_err(|Mismatch| mismatch(path, value, &target))?;
+    checked.map_err(|Mismatch| mismatch(path, value, target.expects()))?;
     Ok(target)
 }
 
@@ -103,7 +103,7 @@ pub fn set_render(settings: &mut RenderSettings, path: &str, value: &Value) -> R
     let Target::Render(field) = target else {
         return Err(EditError::Incomplete { path: path.to_owned(), form: "render.FIELD" });
     };
-    render::set(settings, field, value).map_err(|Mismatch| mismatch(path, value, &target))
+    render::set(settings, field, value).map_err(|Mismatch| mismatch(path, value, target.expects()))
 }
 
 /// Sets all paths in order: the later of two values for one path stays.
@@ -126,7 +126,7 @@ pub fn apply_all(
     let mut cones: Option<&str> = None;
     for Override { path, value } in overrides {
         let target = Target::parse(path)?;
-        let wrong = |Mismatch| mismatch(path, value, &target);
+        let wrong = |Mismatch| mismatch(path, value, target.expects());
         match &target {
             Target::Material(name, field) => {
                 set_named(path, "material", &mut scene.materials, name, |m| {
@@ -171,6 +171,20 @@ pub fn apply_all(
         edit_camera(scene, chosen, &camera)?;
     }
     Ok(())
+}
+
+/// Sets a field of a material that no scene has.
+///
+/// # Errors
+/// If the value does not suit the field, or the material has no such thing; messages call the field by its name alone.
+pub fn set_material(material: &mut Material, field: MaterialField, value: &Value) -> Result<(), EditError> {
+    match material::set(material, field, value) {
+        Ok(Outcome::Set) => Ok(()),
+        Ok(Outcome::NotApplicable(why)) => {
+            Err(EditError::NotApplicable { path: field.name().to_owned(), why })
+        }
+        Err(Mismatch) => Err(mismatch(field.name(), value, field.expects())),
+    }
 }
 
 /// Sets a field of everything that the pattern matches and that has it.
@@ -230,10 +244,10 @@ fn unknown_name<T>(kind: &'static str, name: &str, all: &[Named<T>]) -> EditErro
     }
 }
 
-fn mismatch(path: &str, value: &Value, target: &Target) -> EditError {
+fn mismatch(path: &str, value: &Value, expected: &'static str) -> EditError {
     let found = match value {
         Value::Text(text) => format!("{:?}", shortened(text)),
         other => shortened(&other.to_string()),
     };
-    EditError::Value { path: path.to_owned(), found, expected: target.expects() }
+    EditError::Value { path: path.to_owned(), found, expected }
 }
