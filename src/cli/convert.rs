@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::render::parse_enum;
+use super::conversion::Conversion;
 use super::{FAILED, Outcome, Talk, WELL, print, tell};
 use crate::convert::ConvertOptions;
-use crate::disney::DiffuseModel;
 use crate::export::{self, Exported, Input, Target, export};
 use crate::import::ImportOptions;
 
@@ -35,9 +34,8 @@ pub(super) struct Arguments {
     /// How to tell what became of the materials, on stdout.
     #[arg(long, value_enum, default_value_t = Report::Table)]
     report: Report,
-    /// The diffuse term of Disney materials: burley, lambert or lambert_fresnel.
-    #[arg(long, value_name = "MODEL", value_parser = parse_enum::<DiffuseModel>)]
-    diffuse: Option<DiffuseModel>,
+    #[command(flatten)]
+    conversion: Conversion,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -56,7 +54,7 @@ fn parse_target(text: &str) -> Result<Target, String> {
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let inputs = export::inputs(&arguments.scenes, &output(arguments))?;
-    let options = ConvertOptions { diffuse: arguments.diffuse };
+    let options = arguments.conversion.options();
     let (exported, failed) = convert_all(&inputs, arguments.to, &options, talk);
     for warning in exported.iter().flat_map(|e| &e.warnings) {
         talk.say(&format!("warning: {warning}"));

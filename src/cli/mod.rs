@@ -3,6 +3,7 @@
 
 mod accept;
 mod completions;
+mod conversion;
 mod convert;
 mod diff;
 mod inspect;

@@ -7,10 +7,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use self::config_root::{Outputs, Shown};
+use super::conversion::Conversion;
 use super::progress::Progress;
 use super::{Outcome, Talk, WELL, print};
-use crate::convert::ConvertOptions;
-use crate::disney::DiffuseModel;
 use crate::imagefile;
 use crate::import::{ArisConfig, ImportOptions, LightUnits};
 use crate::job::{self, Build, JobError, LoadedRun, LoadedScene, PlannedJob};
@@ -73,9 +72,8 @@ pub(super) struct Arguments {
     /// The pixel filter.
     #[arg(long, value_name = "FILTER", value_parser = parse_enum::<Filter>)]
     filter: Option<Filter>,
-    /// The diffuse term of Disney materials: burley, lambert or lambert_fresnel.
-    #[arg(long, value_name = "MODEL", value_parser = parse_enum::<DiffuseModel>)]
-    diffuse: Option<DiffuseModel>,
+    #[command(flatten)]
+    conversion: Conversion,
     /// A material library to lay over the scene's materials, such as `pipeline convert` writes.
     #[arg(long, value_name = "FILE")]
     materials: Option<PathBuf>,
@@ -138,7 +136,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         time: arguments.time,
         animation: arguments.animation.clone(),
     };
-    let convert_options = ConvertOptions { diffuse: arguments.diffuse };
+    let convert_options = arguments.conversion.options();
     let materials = arguments.materials.as_deref();
     let run = match &config {
         Some(config) => job::load_configured(config, &convert_options, materials),

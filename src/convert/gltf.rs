@@ -1,33 +1,34 @@
 //! glTF materials into Disney materials.
 
 use super::tint::{F0_OF_SPECULAR, disney_luminance, fit_tint};
-use super::{Note, Quality};
+use super::{ClearcoatScale, ConvertOptions, Note, Quality};
 use crate::color::Rgb;
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
 use crate::math::Real;
 use crate::record::Warning;
-use crate::scene::Material;
 use crate::scene::material::{
-    Emission, NormalMap, Opacity, Param, ShadingFrame, Sides, TextureChannel, TextureMap,
+    Curve, Emission, NormalMap, Opacity, Param, ShadingFrame, Sides, TextureChannel, TextureMap,
 };
 use crate::scene::source::{
     AlphaMode, GltfAnisotropy, GltfClearcoat, GltfMaterial, GltfSheen, GltfSpecular, GltfVolume,
 };
+use crate::scene::{AnisotropyMap, Material};
 
 /// glTF's index of refraction where KHR_materials_ior says nothing.
 const DEFAULT_IOR: f32 = 1.5;
 
-/// The Disney material of the glTF material `source` called `name`, with glTF's own diffuse term replaced by `diffuse`.
+/// The Disney material of the glTF material `source` called `name`, with glTF's own diffuse term replaced by that of `options`.
 ///
 /// Disney's model with the matched G and `lambert_fresnel` is glTF's metallic-roughness model; under `burley` the parameters are
 /// carried and the diffuse term differs.
 pub(super) fn convert(
     name: &str,
     source: &GltfMaterial,
-    diffuse: DiffuseModel,
+    options: &ConvertOptions,
     notes: &mut Vec<Note>,
     warnings: &mut Vec<Warning>,
 ) -> Material {
+    let diffuse = options.diffuse.unwrap_or_default();
     let mut notes = Notes { material: name, notes };
     let mut material = Material {
         masking: Masking::Matched,
@@ -35,6 +36,7 @@ pub(super) fn convert(
         opacity: opacity(source, &mut notes),
         frame: ShadingFrame::Surface,
         sides: Sides::Both,
+        culled: options.cull && !source.double_sided,
         vertex_color: source.vertex_color,
         vertex_alpha: source.vertex_color && source.alpha_mode != AlphaMode::Opaque,
         ..Material::default()
@@ -75,10 +77,10 @@ pub(super) fn convert(
     }
     *material.scalar_mut(Parameter::ClearcoatGloss) = Param::Constant(1.0);
     if let Some(coat) = &source.clearcoat {
-        convert_clearcoat(coat, &mut material, &mut notes);
+        convert_clearcoat(coat, options.clearcoat, &mut material, &mut notes);
     }
     if let Some(sheen) = &source.sheen {
-        convert_sheen(sheen, source, &mut material, &mut notes);
+        convert_sheen(sheen, source, options.sheen_scale, &mut material, &mut notes);
     }
     if let Some(anisotropy) = &source.anisotropy {
         convert_anisotropy(anisotropy, source, &mut material, &mut notes);
@@ -191,7 +193,8 @@ fn emitting_sides(source: &GltfMaterial) -> Sides {
 
 fn convert_emission(source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
     let color = colored(source.emissive_factor, source.emissive_texture.as_ref());
-    material.emission = Emission { color, strength: source.emissive_strength, sides: emitting_sides(source) };
+    material.emission =
+        Emission { color, strength: source.emissive_strength, sides: emitting_sides(source), unlit: false };
     if material.emits() {
         notes.add("emissiveFactor", Quality::Exact, "");
         if source.emissive_texture.is_some() {
@@ -212,12 +215,11 @@ fn make_unlit(source: &GltfMaterial, material: &mut Material, notes: &mut Notes)
         color: colored(source.base_color_factor, source.base_color_texture.as_ref()),
         strength: 1.0,
         sides: Sides::Both,
+        unlit: true,
     };
-    let reason = "the base colour as emission, which also lights other surfaces";
-    notes.add("KHR_materials_unlit", Quality::Approximated, reason);
+    notes.add("KHR_materials_unlit", Quality::Exact, "the base colour, which the camera alone sees");
     if source.vertex_color {
-        let reason = "vertex colours don't multiply emission";
-        notes.add("COLOR_0", Quality::Dropped, reason);
+        notes.add("COLOR_0", Quality::Exact, "");
     }
 }
 
@@ -243,11 +245,11 @@ fn convert_specular(
     let tint = fit_tint(f0, source.base_color_factor);
     // Rounding may lift the luminance of white above 1.
     let specular = ((disney_luminance(f0) / F0_OF_SPECULAR) as f32).min(Parameter::Specular.max());
-    // F0 is in proportion to the factor, and so to its texture; a colour's luminance stands mostly in its green.
+    // F0 is in proportion to the factor, and so to its texture.
     let strength = extension.texture.as_ref();
     let (map, channel) = match (strength, extension.color_texture.as_ref()) {
         (Some(strength), _) => (Some(strength), TextureChannel::A),
-        (None, color) => (color, TextureChannel::G),
+        (None, color) => (color, TextureChannel::Y),
     };
     *material.scalar_mut(Parameter::Specular) = textured(specular, map, channel);
     *material.scalar_mut(Parameter::SpecularTint) = Param::Constant(tint.amount);
@@ -274,7 +276,7 @@ fn convert_specular(
             (_, None) => return,
             (Some(_), Some(_)) => (Quality::Dropped, "a parameter has one texture: that is specularTexture"),
             (None, Some(_)) => {
-                (Quality::Approximated, "its green stands for its luminance, its hue is the factor's")
+                (Quality::Approximated, "its luminance varies the specular, its hue is the factor's")
             }
         };
         notes.add("KHR_materials_specular.specularColorTexture", quality, reason);
@@ -282,14 +284,27 @@ fn convert_specular(
 }
 
 /// KHR_materials_clearcoat: Disney's coat is 0.25·clearcoat·GTR1 with F0 0.04, so factor 1 is clearcoat 4.
-fn convert_clearcoat(coat: &GltfClearcoat, material: &mut Material, notes: &mut Notes) {
-    *material.scalar_mut(Parameter::Clearcoat) =
-        textured(4.0 * coat.factor, coat.texture.as_ref(), TextureChannel::R);
+fn convert_clearcoat(
+    coat: &GltfClearcoat,
+    scale: ClearcoatScale,
+    material: &mut Material,
+    notes: &mut Notes,
+) {
+    let (factor, told) = match scale {
+        ClearcoatScale::Matched => (4.0 * coat.factor, "clearcoat = 4·factor"),
+        ClearcoatScale::Published => (coat.factor, "clearcoat = factor, 4.3 to 8 times dimmer than glTF's"),
+    };
+    *material.scalar_mut(Parameter::Clearcoat) = textured(factor, coat.texture.as_ref(), TextureChannel::R);
     // Disney's alpha is lerp(0.1, 0.001, gloss), glTF's roughness².
-    let gloss = ((0.1 - coat.roughness * coat.roughness) / 0.099).clamp(0.0, 1.0);
-    *material.scalar_mut(Parameter::ClearcoatGloss) = Param::Constant(gloss);
-    let mut reason =
-        "clearcoat = 4·factor; GTR1 for GGX, and the base is not darkened under the coat".to_owned();
+    let curve = Curve::GlossOfRoughness;
+    *material.scalar_mut(Parameter::ClearcoatGloss) = match &coat.roughness_texture {
+        None => Param::Constant(curve.at(coat.roughness)),
+        Some(map) => Param::Texture {
+            map: TextureMap { channel: TextureChannel::G, curve, ..map.clone() },
+            factor: coat.roughness,
+        },
+    };
+    let mut reason = format!("{told}; GTR1 for GGX, and the base is not darkened under the coat");
     // lerp(0.1, 0.001, 0) is the roughest coat there is.
     if coat.roughness * coat.roughness > 0.1 {
         reason.push_str("; the coat's alpha ends at 0.1");
@@ -298,13 +313,18 @@ fn convert_clearcoat(coat: &GltfClearcoat, material: &mut Material, notes: &mut 
 }
 
 /// KHR_materials_sheen: colour as sheen and sheen_tint.
-fn convert_sheen(sheen: &GltfSheen, source: &GltfMaterial, material: &mut Material, notes: &mut Notes) {
+fn convert_sheen(
+    sheen: &GltfSheen,
+    source: &GltfMaterial,
+    scale: f32,
+    material: &mut Material,
+    notes: &mut Notes,
+) {
     let color = sheen.color.cast();
     let tint = fit_tint(color, source.base_color_factor);
-    let amount = (disney_luminance(color) as f32).min(1.0);
-    // A colour's luminance stands mostly in its green.
+    let amount = (scale * disney_luminance(color) as f32).min(1.0);
     *material.scalar_mut(Parameter::Sheen) =
-        textured(amount, sheen.color_texture.as_ref(), TextureChannel::G);
+        textured(amount, sheen.color_texture.as_ref(), TextureChannel::Y);
     *material.scalar_mut(Parameter::SheenTint) = Param::Constant(tint.amount);
     let reason = format!(
         "no roughness; Charlie's lobe is 6 to 26 times brighter than Disney's at an equal factor; hue: {}",
@@ -312,41 +332,37 @@ fn convert_sheen(sheen: &GltfSheen, source: &GltfMaterial, material: &mut Materi
     );
     notes.add("KHR_materials_sheen", Quality::Approximated, &reason);
     if sheen.color_texture.is_some() {
-        let reason = "its green stands for its luminance, its hue is the factor's";
+        let reason = "its luminance varies the sheen, its hue is the factor's";
         notes.add("KHR_materials_sheen.sheenColorTexture", Quality::Approximated, reason);
     }
 }
 
-/// KHR_materials_anisotropy: with a = roughness² along the bitangent and t = a + (1-a)·strength² along the tangent, Disney's
-/// alphas roughness²/aspect and roughness²·aspect are t and a for roughness = (t·a)^¼ and anisotropic = (1 - a/t)/0.9.
+/// KHR_materials_anisotropy: worked out once, or at each point where a texture varies it or the roughness.
 fn convert_anisotropy(
     anisotropy: &GltfAnisotropy,
     source: &GltfMaterial,
     material: &mut Material,
     notes: &mut Notes,
 ) {
-    let a = Real::sqr(source.roughness_factor);
-    let t = a + (1.0 - a) * Real::sqr(anisotropy.strength);
-    let ratio = if t > 0.0 { a / t } else { 1.0 };
-    let anisotropic = (1.0 - ratio) / 0.9;
-    *material.scalar_mut(Parameter::Anisotropic) = Param::Constant(anisotropic.min(1.0));
-    material.rotation = anisotropy.rotation;
-    let (quality, reason) = if source.metallic_roughness_texture.is_some() {
-        // The formula doesn't factor into a texture and a constant.
-        (
-            Quality::Approximated,
-            "the aspect is that of roughnessFactor; the texture's roughness is kept as it is",
-        )
+    let GltfAnisotropy { strength, rotation, ref texture } = *anisotropy;
+    material.rotation = rotation;
+    let disney = AnisotropyMap::disney(source.roughness_factor, strength);
+    if texture.is_some() || source.metallic_roughness_texture.is_some() {
+        material.anisotropy = Some(AnisotropyMap { map: texture.clone(), strength });
     } else {
-        *material.scalar_mut(Parameter::Roughness) = Param::Constant((t * a).sqrt().sqrt());
-        match anisotropic <= 1.0 {
-            true => (Quality::Exact, ""),
-            false => {
-                (Quality::Approximated, "the ratio of the two alphas is more than Disney's 10 and ends there")
-            }
+        *material.scalar_mut(Parameter::Anisotropic) = Param::Constant(disney.anisotropic.min(1.0));
+        *material.scalar_mut(Parameter::Roughness) = Param::Constant(disney.roughness);
+    }
+    let (quality, reason) = match disney.anisotropic <= 1.0 {
+        true => (Quality::Exact, ""),
+        false => {
+            (Quality::Approximated, "the ratio of the two alphas is more than Disney's 10 and ends there")
         }
     };
     notes.add("KHR_materials_anisotropy", quality, reason);
+    if texture.is_some() {
+        notes.add("KHR_materials_anisotropy.anisotropyTexture", quality, reason);
+    }
 }
 
 /// A colour of 0 stands for this little: nothing would be left at any distance, and infinity is no coefficient.

@@ -5,7 +5,7 @@ mod gltf;
 mod mtl;
 mod tint;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::disney::{DiffuseModel, Model};
 use crate::record::Warning;
@@ -13,11 +13,52 @@ use crate::scene::source::SourceMaterial;
 use crate::scene::{Material, Named, Scene};
 
 /// What a conversion leaves to its caller.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConvertOptions {
     /// The diffuse term of all Disney materials; each dialect has its own where absent ([`DiffuseModel::Burley`] for glTF).
     pub diffuse: Option<DiffuseModel>,
+    /// How strong a coat is that glTF calls 1.
+    pub clearcoat: ClearcoatScale,
+    /// Multiplies the sheen of glTF's materials, at least 0: Charlie's lobe is 6 to 26 times brighter than Disney's at an equal factor.
+    pub sheen_scale: f32,
+    /// How MTL's exponent becomes a roughness.
+    pub phong: PhongRoughness,
+    /// Whether the backs of glTF's single-sided materials are not there.
+    pub cull: bool,
 }
+
+impl Default for ConvertOptions {
+    fn default() -> Self {
+        let (clearcoat, phong) = (ClearcoatScale::default(), PhongRoughness::default());
+        Self { diffuse: None, clearcoat, sheen_scale: 1.0, phong, cull: false }
+    }
+}
+
+/// How strong a Disney coat is that glTF calls 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ClearcoatScale {
+    /// 4, the factor that Disney's lobe divides by: as bright as glTF's.
+    #[default]
+    Matched,
+    /// 1, as the parameter is published.
+    Published,
+}
+
+named_variants! { ClearcoatScale { Matched "matched", Published "published", } }
+
+/// How MTL's `Ns` becomes a roughness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PhongRoughness {
+    /// (2/(Ns+2))^¼: a lobe as wide as Phong's (Walter 2007).
+    #[default]
+    Walter,
+    /// 1 - √(Ns/1000), as Blender reads and writes it.
+    Blender,
+}
+
+named_variants! { PhongRoughness { Walter "walter", Blender "blender", } }
 
 /// A converted scene and what the conversion has to say.
 #[derive(Clone, Debug)]
@@ -64,11 +105,8 @@ pub fn to_disney(scene: Scene<SourceMaterial>, options: &ConvertOptions) -> Conv
     let (mut notes, mut warnings) = (Vec::new(), Vec::new());
     let scene = scene.map_materials(|Named { name, item }| {
         let mut material = match &item {
-            SourceMaterial::Gltf(source) => {
-                let diffuse = options.diffuse.unwrap_or_default();
-                gltf::convert(&name, source, diffuse, &mut notes, &mut warnings)
-            }
-            SourceMaterial::Mtl(source) => mtl::convert(&name, source, &mut notes, &mut warnings),
+            SourceMaterial::Gltf(source) => gltf::convert(&name, source, options, &mut notes, &mut warnings),
+            SourceMaterial::Mtl(source) => mtl::convert(&name, source, options, &mut notes, &mut warnings),
             SourceMaterial::Aris(source) => aris::convert(&name, source, &mut notes, &mut warnings),
         };
         if let (Model::Disney, Some(diffuse)) = (material.model, options.diffuse) {
@@ -89,7 +127,8 @@ mod tests {
         let mut scene = Scene::empty();
         let source = SourceMaterial::Gltf(GltfMaterial::default());
         scene.materials.push(Named::new("ball", source));
-        let with = |diffuse| to_disney(scene.clone(), &ConvertOptions { diffuse });
+        let with =
+            |diffuse| to_disney(scene.clone(), &ConvertOptions { diffuse, ..ConvertOptions::default() });
         assert_eq!(with(None).scene.materials[0].item.diffuse, DiffuseModel::Burley);
         let converted = with(Some(DiffuseModel::LambertFresnel));
         assert_eq!(converted.scene.materials[0].item.diffuse, DiffuseModel::LambertFresnel);

@@ -91,7 +91,8 @@ impl RootWriter<'_> {
     }
 
     fn brdf(&self, named: &Named<Material>) -> String {
-        let m = &named.item;
+        let flat = self.scene.with_mean_anisotropy(&named.item);
+        let m = &flat;
         let color = rgb(self.mean_color(&m.base_color));
         match m.model {
             Model::Mirror => "  - name: mirror\n    config: {}\n".into(),
@@ -217,6 +218,7 @@ impl RootWriter<'_> {
                     disney && m.scalar(Parameter::Clearcoat).constant().is_none_or(|c| c > 1.0),
                     "ends at 1",
                 ),
+                ("anisotropy", m.anisotropy.is_some(), "its mean, along the tangent"),
                 ("sides", m.sides == Sides::Both && m.model != Model::Dielectric, "black from behind"),
                 ("emission", m.emits() && m.emission.sides == Sides::Both, "the front alone shines"),
             ];
@@ -241,10 +243,7 @@ impl RootWriter<'_> {
     }
 
     fn mean(&self, param: &Param<f32>) -> f32 {
-        match param {
-            Param::Constant(value) => *value,
-            Param::Texture { map, factor } => map.channel.of(&self.scene.mean_texel(map)) * factor,
-        }
+        self.scene.mean_scalar(param)
     }
 
     fn mean_color(&self, param: &Param<Rgb>) -> Rgb {

@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::convert::{Note, Quality};
 use crate::disney::{BASE_COLOR, DiffuseModel, Masking, Model, Parameter};
 use crate::library::TextureFiles;
-use crate::scene::material::{Param, TextureChannel, TextureMap};
+use crate::scene::material::{Curve, Param, TextureChannel, TextureMap};
 use crate::scene::texture::{Encoding, TexelFilter, Wrap};
 use crate::scene::{Material, Named, Scene};
 
@@ -79,7 +79,11 @@ impl MaterialWriter<'_, '_, '_> {
     }
 
     fn write(&mut self, id: &str, material: &Material) -> std::io::Result<()> {
-        let flat = principled(material);
+        let mut flat = principled(&self.scene.with_mean_anisotropy(material));
+        if material.anisotropy.is_some() {
+            self.note("anisotropic", Quality::Approximated, "the mean of its strength, along the tangent");
+        }
+        self.replace_curves(&mut flat);
         let mut inputs = vec![("baseColor", Input::Color(&flat.base_color))];
         inputs.extend(INPUTS.map(|(parameter, name)| (name, Input::Float(flat.scalar(parameter)))));
         inputs.push(("subsurface", Input::Float(flat.scalar(Parameter::Subsurface))));
@@ -118,6 +122,18 @@ impl MaterialWriter<'_, '_, '_> {
         )?;
         self.tell(material);
         Ok(())
+    }
+
+    /// Means in place of textures that hold another quantity than the input, or all channels of which count.
+    fn replace_curves(&mut self, flat: &mut Material) {
+        for parameter in Parameter::ALL {
+            let param = flat.scalar_mut(parameter);
+            let Param::Texture { map, .. } = param else { continue };
+            if map.curve != Curve::Linear || map.channel == TextureChannel::Y {
+                *param = Param::Constant(self.scene.mean_scalar(param));
+                self.note(parameter.name(), Quality::Approximated, "the mean of its texture");
+            }
+        }
     }
 
     /// The nodes that read textures, as a graph with an output for each input of the shader.

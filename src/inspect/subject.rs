@@ -5,8 +5,8 @@ use crate::color::Rgb;
 use crate::disney::{Alpha, BASE_COLOR, Bsdf, Lobe, Model, Parameter, alpha_from_roughness};
 use crate::math::V3;
 use crate::render::constant_bsdf;
-use crate::scene::material::{Material, Param, TextureChannel};
-use crate::scene::{Named, Scene, texture::Texel};
+use crate::scene::material::{Material, Param};
+use crate::scene::{Named, Scene};
 
 /// A material to look into.
 #[derive(Clone, Debug)]
@@ -62,6 +62,10 @@ impl Subject {
         for parameter in Parameter::ALL {
             *flat.scalar_mut(parameter) = scalar(parameter, &mut means);
         }
+        if material.anisotropy.as_ref().is_some_and(|a| a.map.is_some()) {
+            means.push("anisotropy");
+        }
+        flat = scene.with_mean_anisotropy(&flat);
         let emission = constant_color(scene, &material.emission.color, "emission_color", &mut means);
         flat.emission.color = Param::Constant(emission);
         for (color, name) in [
@@ -207,20 +211,10 @@ fn constant(
     name: &'static str,
     means: &mut Vec<&'static str>,
 ) -> f32 {
-    match param {
-        Param::Constant(value) => *value,
-        Param::Texture { map, factor } => {
-            means.push(name);
-            let Texel { color, alpha } = scene.mean_texel(map);
-            factor
-                * match map.channel {
-                    TextureChannel::R => color.r,
-                    TextureChannel::G => color.g,
-                    TextureChannel::B => color.b,
-                    TextureChannel::A => alpha,
-                }
-        }
+    if param.constant().is_none() {
+        means.push(name);
     }
+    scene.mean_scalar(param)
 }
 
 #[cfg(test)]
@@ -228,7 +222,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::scene::material::TextureMap;
+    use crate::scene::material::{TextureChannel, TextureMap};
     use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
     use crate::scene::{Image, ImageId, Texture, TextureId};
 

@@ -14,9 +14,9 @@ use crate::import::{FileDigest, Files, read_image};
 use crate::manifest::edit::{MaterialField, set_material};
 use crate::manifest::nearest::nearest;
 use crate::record::{Value, Warning};
-use crate::scene::material::{NormalMap, Param, ShadingFrame, Sides, TextureChannel, TextureMap};
+use crate::scene::material::{Curve, NormalMap, Param, ShadingFrame, Sides, TextureChannel, TextureMap};
 use crate::scene::texture::{Encoding, TexelFilter, Texture, Wrap};
-use crate::scene::{ImageId, Material, Scene, TextureId};
+use crate::scene::{AnisotropyMap, ImageId, Material, Scene, TextureId};
 
 pub(super) fn lay_over(
     library: Library,
@@ -68,6 +68,8 @@ impl Overlay<'_> {
             // Aris has two indices; what counts is one over the other.
             keys::EXT_IOR | keys::INT_IOR => self.index_of(material, key, node),
             keys::EMISSION_SIDES => choice(node, Sides::from_name).map(|s| material.emission.sides = s),
+            keys::CULLED => flag(node).map(|is| material.culled = is),
+            keys::UNLIT => flag(node).map(|is| material.emission.unlit = is),
             keys::SIDES => choice(node, Sides::from_name).map(|s| material.sides = s),
             keys::FRAME => choice(node, ShadingFrame::from_name).map(|f| material.frame = f),
             keys::VERTEX_COLOR => flag(node).map(|is| material.vertex_color = is),
@@ -76,6 +78,20 @@ impl Overlay<'_> {
                 let (map, _) = self.texture(node, Encoding::Linear)?;
                 let scale = material.normal_map.as_ref().map_or(1.0, |n| n.scale);
                 material.normal_map = Some(NormalMap { map, scale });
+                Ok(())
+            }
+            keys::ANISOTROPY_MAP => {
+                let (map, _) = self.texture(node, Encoding::Linear)?;
+                let strength = material.anisotropy.as_ref().map_or(1.0, |a| a.strength);
+                material.anisotropy = Some(AnisotropyMap { map: Some(map), strength });
+                Ok(())
+            }
+            keys::ANISOTROPY_STRENGTH => {
+                let strength = number(node)?;
+                if !(0.0..=1.0).contains(&strength) {
+                    return Err(form(&node.place, "a number in [0, 1] is expected"));
+                }
+                material.anisotropy.get_or_insert(AnisotropyMap { map: None, strength }).strength = strength;
                 Ok(())
             }
             _ => {
@@ -158,7 +174,7 @@ impl Overlay<'_> {
             return Err(form(&node.place, "a texture is expected, such as {file: textures/oak.png}"));
         };
         let (mut file, mut factor) = (None, None);
-        let mut channel = TextureChannel::default();
+        let (mut channel, mut curve) = (TextureChannel::default(), Curve::default());
         let (mut uv_set, mut texture_from_uv) = (0, Affine2::IDENTITY);
         let mut texture = Texture {
             image: ImageId(0),
@@ -171,6 +187,7 @@ impl Overlay<'_> {
                 keys::FILE => file = Some(node),
                 keys::FACTOR => factor = Some(node),
                 keys::CHANNEL => channel = choice(node, TextureChannel::from_name)?,
+                keys::CURVE => curve = choice(node, Curve::from_name)?,
                 keys::ENCODING => texture.encoding = choice(node, Encoding::from_name)?,
                 keys::FILTER => texture.filter = choice(node, TexelFilter::from_name)?,
                 keys::UV_SET => uv_set = number(node)?.clamp(0.0, 255.0) as u32,
@@ -194,7 +211,7 @@ impl Overlay<'_> {
             self.scene.textures.push(texture);
             self.scene.textures.len() - 1
         });
-        Ok((TextureMap { texture: TextureId(index as u32), channel, uv_set, texture_from_uv }, factor))
+        Ok((TextureMap { texture: TextureId(index as u32), channel, curve, uv_set, texture_from_uv }, factor))
     }
 
     fn image(&mut self, node: &Node) -> Result<ImageId, LibraryError> {
@@ -218,6 +235,7 @@ fn known_of_texture() -> String {
     let known = [
         keys::FILE,
         keys::CHANNEL,
+        keys::CURVE,
         keys::FACTOR,
         keys::ENCODING,
         keys::UV_SET,

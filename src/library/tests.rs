@@ -6,8 +6,8 @@ use crate::color::Rgb;
 use crate::convert::{ConvertOptions, to_disney};
 use crate::disney::{Model, Parameter};
 use crate::import::{ImportOptions, import};
-use crate::scene::material::Param;
-use crate::scene::{Material, Named, Scene};
+use crate::scene::material::{Curve, Param, TextureChannel, TextureMap};
+use crate::scene::{AnisotropyMap, Material, Named, Scene, TextureId};
 
 fn library(text: &str) -> Result<Scene<Material>, LibraryError> {
     let folder = tempfile::tempdir().unwrap();
@@ -89,6 +89,34 @@ fn what_an_entry_does_not_say_stays() {
     Library::read(&path).unwrap().unwrap().lay_over(&mut scene).unwrap();
     *material.scalar_mut(Parameter::Roughness) = Param::Constant(0.125);
     assert_eq!(scene.materials[0].item, material);
+}
+
+#[test]
+fn what_only_conversions_make_comes_back_too() {
+    let mut scene = to_disney(
+        import(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/spheres.glb"), &ImportOptions::default())
+            .unwrap()
+            .scene,
+        &ConvertOptions::default(),
+    )
+    .scene;
+    assert!(!scene.textures.is_empty());
+    let map = |channel| TextureMap::new(TextureId(0), channel);
+    let material = &mut scene.materials[0].item;
+    material.anisotropy = Some(AnisotropyMap { map: Some(map(TextureChannel::R)), strength: 0.7 });
+    let coat = TextureMap { curve: Curve::GlossOfRoughness, ..map(TextureChannel::Y) };
+    *material.scalar_mut(Parameter::ClearcoatGloss) = Param::Texture { map: coat, factor: 0.3 };
+    material.emission.color = Param::Constant(Rgb::grey(0.2));
+    (material.emission.unlit, material.culled) = (true, true);
+    let folder = tempfile::tempdir().unwrap();
+    let written = write(&scene, "x.glb");
+    written.textures.save(folder.path()).unwrap();
+    let path = folder.path().join(FILE_NAME);
+    std::fs::write(&path, &written.text).unwrap();
+    let mut laid_over = scene.clone();
+    laid_over.materials[0].item = Material::default();
+    Library::read(&path).unwrap().unwrap().lay_over(&mut laid_over).unwrap();
+    assert_eq!(flat(&scene, &scene.materials[0].item), flat(&laid_over, &laid_over.materials[0].item));
 }
 
 /// Materials of all scenes of the project, textures and all: writing and laying over changes nothing.

@@ -6,7 +6,7 @@ use super::{TextureFiles, keys};
 use crate::color::Rgb;
 use crate::disney::{Model, Parameter};
 use crate::scene::Scene;
-use crate::scene::material::{Material, Param, TextureChannel, TextureMap};
+use crate::scene::material::{Curve, Material, Param, TextureChannel, TextureMap};
 use crate::scene::texture::{TexelFilter, Wrap};
 
 /// A library's text and its textures.
@@ -111,6 +111,9 @@ impl Writer<'_> {
             self.color("emissionColor", &m.emission.color);
             self.entry("emissionStrength", &number(m.emission.strength));
             self.entry(keys::EMISSION_SIDES, m.emission.sides.name());
+            if m.emission.unlit {
+                self.entry(keys::UNLIT, "true");
+            }
         }
         if m.opacity != default.opacity {
             self.scalar("opacity", &m.opacity.alpha);
@@ -123,6 +126,13 @@ impl Writer<'_> {
             self.entry(keys::NORMAL_MAP, &map);
             self.entry("normalScale", &number(normal.scale));
         }
+        if let Some(anisotropy) = &m.anisotropy {
+            if let Some(map) = &anisotropy.map {
+                let map = self.map(map, None, None);
+                self.entry(keys::ANISOTROPY_MAP, &map);
+            }
+            self.entry(keys::ANISOTROPY_STRENGTH, &number(anisotropy.strength));
+        }
         if m.rotation != 0.0 {
             // In f64, so that it comes back to the same bits.
             self.entry("rotation", &f64::from(m.rotation).to_degrees().to_string());
@@ -133,7 +143,11 @@ impl Writer<'_> {
         if m.sides != default.sides {
             self.entry(keys::SIDES, m.sides.name());
         }
-        for (key, is) in [(keys::VERTEX_COLOR, m.vertex_color), (keys::VERTEX_ALPHA, m.vertex_alpha)] {
+        for (key, is) in [
+            (keys::CULLED, m.culled),
+            (keys::VERTEX_COLOR, m.vertex_color),
+            (keys::VERTEX_ALPHA, m.vertex_alpha),
+        ] {
             if is {
                 self.entry(key, "true");
             }
@@ -168,6 +182,9 @@ impl Writer<'_> {
         }
         if let Some(factor) = factor {
             add(keys::FACTOR, &factor);
+        }
+        if map.curve != Curve::default() {
+            add(keys::CURVE, map.curve.name());
         }
         add(keys::ENCODING, texture.encoding.name());
         if map.uv_set != 0 {

@@ -155,6 +155,9 @@ fn whitted(
         medium = surface.medium_before(medium);
         beta *= super::medium::transmittance(medium, hit.t);
         path.radiance += beta * surface.emitted(scene);
+        if vertex == 1 {
+            path.radiance += beta * surface.unlit(scene);
+        }
         let shading = surface.shading(scene);
         if path.first.is_none() {
             path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));

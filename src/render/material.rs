@@ -7,7 +7,7 @@ use crate::color::Rgb;
 use crate::disney::{Bsdf, Model, Parameter, Params};
 use crate::math::Frame;
 use crate::scene::material::{Material, NormalMap, Param, ShadingFrame, Sides, TextureMap};
-use crate::scene::{Scene, texture::Texel};
+use crate::scene::{AnisotropyMap, Scene, texture::Texel};
 
 /// A material, prepared.
 #[derive(Debug)]
@@ -37,12 +37,18 @@ enum Emitting {
     Nothing,
     Constant(Rgb, Sides),
     Varying(Param<Rgb>, f32, Sides),
+    /// What the camera alone sees.
+    Unlit {
+        color: Param<Rgb>,
+        vertex_color: bool,
+        sides: Sides,
+    },
 }
 
 #[derive(Debug)]
 enum Covering {
     Opaque,
-    Varying { alpha: Param<f32>, cutoff: Option<f32>, vertex_alpha: bool },
+    Varying { alpha: Param<f32>, cutoff: Option<f32>, vertex_alpha: bool, culled: bool },
 }
 
 /// Where the shading frame's x axis comes from.
@@ -53,6 +59,7 @@ enum Tangent {
     Surface {
         uv_set: u32,
         rotation: f32,
+        turned: Option<AnisotropyMap>,
     },
     Nori {
         rotation: f32,
@@ -75,6 +82,7 @@ impl PreparedMaterial {
             material.diff_trans_color.as_ref(),
         ];
         let varies = material.vertex_color
+            || material.anisotropy.is_some()
             || colors.into_iter().flatten().any(|c| c.constant().is_none())
             || material.scalars.iter().any(|s| s.constant().is_none());
         let bsdf = if varies && material.model != Model::Mirror {
@@ -87,6 +95,11 @@ impl PreparedMaterial {
         };
         let emission = match (&material.emission.color, material.emits()) {
             (_, false) => Emitting::Nothing,
+            (color, true) if material.emission.unlit => Emitting::Unlit {
+                color: color.clone(),
+                vertex_color: material.vertex_color,
+                sides: material.emission.sides,
+            },
             (Param::Constant(color), true) => {
                 Emitting::Constant(*color * material.emission.strength, material.emission.sides)
             }
@@ -125,7 +138,7 @@ impl PreparedMaterial {
     /// The mean radiance of an emitting material and the sides that emit: for choosing lights.
     pub(super) fn mean_emission(&self, scene: &Scene) -> Option<(Rgb, Sides)> {
         match &self.emission {
-            Emitting::Nothing => None,
+            Emitting::Nothing | Emitting::Unlit { .. } => None,
             Emitting::Constant(radiance, sides) => Some((*radiance, *sides)),
             Emitting::Varying(Param::Constant(color), strength, sides) => Some((*color * *strength, *sides)),
             Emitting::Varying(Param::Texture { map, factor }, strength, sides) => {
@@ -144,16 +157,35 @@ impl PreparedMaterial {
             Emitting::Varying(color, strength, sides) if leaves(*sides) => {
                 read_color(scene, color, at) * *strength
             }
-            Emitting::Constant(..) | Emitting::Varying(..) => Rgb::BLACK,
+            Emitting::Constant(..) | Emitting::Varying(..) | Emitting::Unlit { .. } => Rgb::BLACK,
         }
     }
 
-    /// The fraction of the surface that is there, in [0, 1].
+    /// What the camera alone sees of the surface, from its front or back: KHR_materials_unlit.
     #[inline]
-    pub(super) fn alpha(&self, scene: &Scene, at: &TrianglePoint<'_>) -> f32 {
+    pub(super) fn unlit(&self, scene: &Scene, at: &TrianglePoint<'_>, towards_front: bool) -> Rgb {
+        match &self.emission {
+            Emitting::Unlit { color, vertex_color, sides } if towards_front || *sides == Sides::Both => {
+                let color = read_color(scene, color, at);
+                if !vertex_color {
+                    return color;
+                }
+                let c = at.color();
+                color * Rgb::new(c.x, c.y, c.z)
+            }
+            _ => Rgb::BLACK,
+        }
+    }
+
+    /// The fraction of the surface that is there for what comes along `direction`, in [0, 1].
+    #[inline]
+    pub(super) fn alpha(&self, scene: &Scene, at: &TrianglePoint<'_>, direction: Vec3) -> f32 {
         match &self.opacity {
             Covering::Opaque => 1.0,
-            Covering::Varying { alpha, cutoff, vertex_alpha } => {
+            Covering::Varying { alpha, cutoff, vertex_alpha, culled } => {
+                if *culled && at.geometric_normal().is_some_and(|n| n.dot(direction) > 0.0) {
+                    return 0.0;
+                }
                 let mut value = read_scalar(scene, alpha, at);
                 if *vertex_alpha {
                     value *= at.color().w;
@@ -180,8 +212,16 @@ impl PreparedMaterial {
                 // Products of factors, textures and vertex colours may leave the range by their own rounding or by intent.
                 let base_color = base_color.map(|v| v.clamp(0.0, 1.0));
                 let color = |c: &Param<Rgb>| read_color(scene, c, at).map(|v| v.clamp(0.0, 1.0));
-                scatter(material, base_color, color, |p| {
-                    read_scalar(scene, material.scalar(p), at).clamp(p.min(), p.max())
+                let read = |p: Parameter| read_scalar(scene, material.scalar(p), at).clamp(p.min(), p.max());
+                let Some(anisotropy) = &material.anisotropy else {
+                    return scatter(material, base_color, color, read);
+                };
+                let (strength, _) = read_anisotropy(scene, anisotropy, at);
+                let disney = AnisotropyMap::disney(read(Parameter::Roughness), strength);
+                scatter(material, base_color, color, |p| match p {
+                    Parameter::Roughness => disney.roughness,
+                    Parameter::Anisotropic => disney.anisotropic.min(p.max()),
+                    _ => read(p),
                 })
             }
         }
@@ -205,10 +245,15 @@ impl PreparedMaterial {
         match self.tangent {
             Tangent::Any => Frame::from_normal(normal),
             Tangent::Nori { rotation } => Frame::nori(normal).rotated(rotation),
-            Tangent::Surface { uv_set, rotation } => match at.tangent(uv_set) {
-                Some((tangent, _)) => Frame::from_normal_and_tangent(normal, tangent).rotated(rotation),
-                None => Frame::from_normal(normal).rotated(rotation),
-            },
+            Tangent::Surface { uv_set, rotation, ref turned } => {
+                let Some((tangent, sign)) = at.tangent(uv_set) else {
+                    return Frame::from_normal(normal).rotated(rotation);
+                };
+                let turn = turned.as_ref().map_or(0.0, |map| read_anisotropy(scene, map, at).1);
+                // From the tangent towards the bitangent, on the surface: the same direction seen from behind or in a mirrored map.
+                let around_normal = if is_front { sign } else { -sign };
+                Frame::from_normal_and_tangent(normal, tangent).rotated(around_normal * (rotation + turn))
+            }
         }
     }
 
@@ -275,19 +320,21 @@ fn covering(material: &Material) -> Covering {
         Some(alpha) if !material.vertex_alpha => alpha >= opacity.cutoff.unwrap_or(1.0),
         _ => false,
     };
-    if opaque {
+    if opaque && !material.culled {
         return Covering::Opaque;
     }
     Covering::Varying {
         alpha: opacity.alpha.clone(),
         cutoff: opacity.cutoff,
         vertex_alpha: material.vertex_alpha,
+        culled: material.culled,
     }
 }
 
 fn tangent(material: &Material) -> Tangent {
+    let by_gltf = material.anisotropy.as_ref().is_some_and(|a| a.strength > 0.0);
     let anisotropic = material.model == Model::Disney
-        && material.scalar(Parameter::Anisotropic).constant().is_none_or(|a| a > 0.0);
+        && (by_gltf || material.scalar(Parameter::Anisotropic).constant().is_none_or(|a| a > 0.0));
     if !anisotropic {
         return Tangent::Any;
     }
@@ -296,6 +343,7 @@ fn tangent(material: &Material) -> Tangent {
         ShadingFrame::Surface => Tangent::Surface {
             uv_set: material.normal_map.as_ref().map_or(0, |m| m.map.uv_set),
             rotation: material.rotation,
+            turned: material.anisotropy.clone().filter(|a| a.map.is_some()),
         },
     }
 }
@@ -304,6 +352,12 @@ fn tangent(material: &Material) -> Tangent {
 fn read_texel(scene: &Scene, map: &TextureMap, at: &TrianglePoint<'_>) -> Texel {
     let texture = &scene.textures[map.texture.0 as usize];
     texture.sample(&scene.images[texture.image.0 as usize], map.coordinates(at.uv(map.uv_set)))
+}
+
+/// glTF's anisotropic strength, and the angle from the tangent towards the bitangent.
+#[inline]
+fn read_anisotropy(scene: &Scene, anisotropy: &AnisotropyMap, at: &TrianglePoint<'_>) -> (f32, f32) {
+    anisotropy.at(anisotropy.map.as_ref().map(|map| read_texel(scene, map, at)).as_ref())
 }
 
 #[inline]
@@ -318,6 +372,6 @@ fn read_color(scene: &Scene, param: &Param<Rgb>, at: &TrianglePoint<'_>) -> Rgb 
 fn read_scalar(scene: &Scene, param: &Param<f32>, at: &TrianglePoint<'_>) -> f32 {
     match param {
         Param::Constant(value) => *value,
-        Param::Texture { map, factor } => factor * map.channel.of(&read_texel(scene, map, at)),
+        Param::Texture { map, factor } => map.scalar(&read_texel(scene, map, at), *factor),
     }
 }

@@ -127,6 +127,9 @@ pub(super) fn trace(
             });
             path.radiance += beta * emitted * w_bsdf;
         }
+        if last_scatter.is_none() {
+            path.radiance += beta * surface.unlit(scene);
+        }
 
         // Work out how it scatters.
         let shading = surface.shading(scene);
@@ -203,7 +206,8 @@ pub(super) fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray
         return bvh.closest(ray);
     }
     bvh.closest_where(ray, |hit| {
-        let alpha = scene.material_of(hit.triangle).alpha(&scene.scene, &scene.geometry.at(hit));
+        let alpha =
+            scene.material_of(hit.triangle).alpha(&scene.scene, &scene.geometry.at(hit), ray.direction);
         alpha >= 1.0 || (alpha > 0.0 && sampler.set_of(vertex, Purpose::Opacity, hit.triangle)[0] < alpha)
     })
 }
@@ -233,7 +237,7 @@ pub(super) fn direct_light(
             let light = scene.geometry.point_on(triangle, barycentric);
             let normal = light.geometric_normal().unwrap_or(-sample.wi);
             let material = scene.material_of(triangle);
-            let coverage = material.alpha(&scene.scene, &light);
+            let coverage = material.alpha(&scene.scene, &light, sample.wi);
             let radiance = material.emitted(&scene.scene, &light, normal.dot(sample.wi) < 0.0) * coverage;
             let (point, error) = light.position();
             let target = offset(point, error, normal, -sample.wi);
@@ -281,7 +285,7 @@ fn passing_surface(scene: &Prepared, ray: &Ray, hit: &Hit) -> Rgb {
     if material.blocks_shadow_rays() {
         return Rgb::BLACK;
     }
-    let alpha = material.alpha(&scene.scene, &scene.geometry.at(hit));
+    let alpha = material.alpha(&scene.scene, &scene.geometry.at(hit), ray.direction);
     let absent = Rgb::grey(1.0 - alpha);
     if alpha == 0.0 || !material.lets_shadow_rays_pass {
         return absent;

@@ -3,7 +3,7 @@
 use super::RenderError;
 use crate::color::Rgb;
 use crate::disney::{BASE_COLOR, Parameter};
-use crate::scene::material::{Material, Param, TextureChannel, TextureMap};
+use crate::scene::material::{Curve, Material, Param, TextureChannel, TextureMap};
 use crate::scene::texture::Pixels;
 use crate::scene::{Named, Scene};
 
@@ -16,6 +16,7 @@ struct Reading<'a> {
     map: &'a TextureMap,
     channel: TextureChannel,
     factor: f32,
+    curve: Curve,
     min: f32,
     max: f32,
 }
@@ -27,8 +28,8 @@ struct Reading<'a> {
 pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
     for Named { name, item } in &scene.materials {
         for reading in readings(item) {
-            let Reading { parameter, map, min, max, factor, .. } = reading;
-            for found in extremes(scene, map, reading.channel).map(|value| value * factor) {
+            let Reading { parameter, map, min, max, factor, curve, .. } = reading;
+            for found in extremes(scene, map, reading.channel).map(|value| curve.at(value * factor)) {
                 let slack = ROUNDING * max;
                 if !(min - slack..=max + slack).contains(&found) {
                     let image = scene.textures[map.texture.0 as usize].image;
@@ -47,7 +48,8 @@ fn readings<'m>(material: &'m Material) -> Vec<Reading<'m>> {
     let mut readings = Vec::new();
     let mut scalar = |parameter, param: &'m Param<f32>, min, max| {
         if let Param::Texture { map, factor } = param {
-            readings.push(Reading { parameter, map, channel: map.channel, factor: *factor, min, max });
+            let (channel, curve) = (map.channel, map.curve);
+            readings.push(Reading { parameter, map, channel, factor: *factor, curve, min, max });
         }
     };
     for p in Parameter::ALL {
@@ -67,6 +69,7 @@ fn readings<'m>(material: &'m Material) -> Vec<Reading<'m>> {
             map,
             channel,
             factor,
+            curve: Curve::Linear,
             min: 0.0,
             max: 1.0,
         }));

@@ -64,6 +64,12 @@ impl<'a> Surface<'a> {
         self.material.emitted(&scene.scene, &self.at, self.is_front)
     }
 
+    /// What the camera alone sees of it.
+    #[inline]
+    pub(super) fn unlit(&self, scene: &Prepared) -> Rgb {
+        self.material.unlit(&scene.scene, &self.at, self.is_front)
+    }
+
     /// Frame and BSDF; none where the surface scatters nothing towards the viewer.
     ///
     /// The shading normal is turned to the viewer's geometric side, except for interfaces, whose inside is a place of its own.

@@ -9,7 +9,7 @@ use glam::{Affine2, Affine3A, Vec3};
 use super::camera::{Aperture, FovAxis, Projection};
 use super::environment::{EnvironmentMap, Equirectangular};
 use super::light::LightKind;
-use super::material::{Param, Sides, TextureMap};
+use super::material::{Curve, Param, Sides, TextureMap};
 use super::source::SourceMaterial;
 use super::texture::{Pixels, Wrap};
 use super::{Camera, Light, Material, Mesh, Scene};
@@ -164,7 +164,8 @@ fn dump_material(out: &mut String, m: &Material) -> fmt::Result {
     line("absorption", m.absorption != default.absorption, &|| rgb(m.absorption));
     line("emission", m.emission != default.emission, &|| {
         let color = param(&m.emission.color, rgb, Reading::Color);
-        format!("{color}, strength {}, {}", m.emission.strength, sides(m.emission.sides))
+        let unlit = if m.emission.unlit { ", unlit" } else { "" };
+        format!("{color}, strength {}, {}{unlit}", m.emission.strength, sides(m.emission.sides))
     });
     line("opacity", m.opacity != default.opacity, &|| {
         let cutoff = m.opacity.cutoff.map_or(String::new(), |c| format!(", cutoff {c}"));
@@ -173,9 +174,14 @@ fn dump_material(out: &mut String, m: &Material) -> fmt::Result {
     if let Some(n) = &m.normal_map {
         line("normal_map", true, &|| format!("{}, scale {}", map(&n.map, Reading::Color), n.scale));
     }
+    if let Some(a) = &m.anisotropy {
+        let map = a.map.as_ref().map_or(String::new(), |m| format!("{}, ", map(m, Reading::Color)));
+        line("anisotropy", true, &|| format!("{map}strength {}", a.strength));
+    }
     line("frame", m.frame != default.frame, &|| m.frame.name().into());
     line("rotation", m.rotation != default.rotation, &|| m.rotation.to_string());
     line("sides", m.sides != default.sides, &|| sides(m.sides).into());
+    line("culled", m.culled, &|| "true".into());
     line("vertex_color", m.vertex_color != default.vertex_color, &|| m.vertex_color.to_string());
     line("vertex_alpha", m.vertex_alpha != default.vertex_alpha, &|| m.vertex_alpha.to_string());
     lines.into_iter().try_for_each(|(name, text)| writeln!(out, "    {name}: {text}"))
@@ -201,6 +207,9 @@ fn map(map: &TextureMap, reading: Reading) -> String {
         Reading::Scalar => format!(".{}", map.channel.name()),
     };
     let mut text = format!("texture {}{channel}", map.texture.0);
+    if map.curve != Curve::Linear {
+        text.push_str(&format!(", {}", map.curve.name()));
+    }
     if map.uv_set != 0 {
         text.push_str(&format!(", uv set {}", map.uv_set));
     }

@@ -4,10 +4,11 @@ use glam::{Affine2, Vec2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::TextureId;
 use super::texture::Texel;
+use super::{AnisotropyMap, TextureId};
 use crate::color::Rgb;
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
+use crate::math::Real;
 
 /// What a surface is made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,12 +37,16 @@ pub struct Material {
     pub opacity: Opacity,
     /// Perturbs the shading normal.
     pub normal_map: Option<NormalMap>,
+    /// glTF's anisotropy, in place of `anisotropic`: `roughness` is glTF's then.
+    pub anisotropy: Option<AnisotropyMap>,
     /// Where the tangent comes from.
     pub frame: ShadingFrame,
     /// Turns the tangent about the normal, counter-clockwise, in radians.
     pub rotation: f32,
     /// The sides that scatter light; the other side blocks.
     pub sides: Sides,
+    /// Its back is not there: what looks at it from behind sees through it.
+    pub culled: bool,
     /// Whether the mesh's vertex colours multiply `base_color`.
     pub vertex_color: bool,
     /// Whether their alpha multiplies the opacity.
@@ -64,9 +69,11 @@ impl Default for Material {
             emission: Emission::default(),
             opacity: Opacity::default(),
             normal_map: None,
+            anisotropy: None,
             frame: ShadingFrame::default(),
             rotation: 0.0,
             sides: Sides::Both,
+            culled: false,
             vertex_color: false,
             vertex_alpha: false,
         }
@@ -97,6 +104,11 @@ impl Material {
     /// Its surface divides places: light that goes through enters or leaves an inside.
     pub fn is_interface(&self) -> bool {
         self.transmits() && (self.model == Model::Dielectric || !self.thin_walled)
+    }
+
+    /// Whether it lights other surfaces, or itself.
+    pub fn is_light(&self) -> bool {
+        self.emits() && !self.emission.unlit
     }
 
     /// Whether any light leaves the surface by itself.
@@ -140,6 +152,8 @@ pub struct TextureMap {
     pub texture: TextureId,
     /// What a scalar parameter reads of it; colours read R, G and B.
     pub channel: TextureChannel,
+    /// What a scalar parameter makes of that, times the factor; colours are as they are.
+    pub curve: Curve,
     /// The mesh's set of texture coordinates.
     pub uv_set: u32,
     /// Texture coordinates from the mesh's.
@@ -149,7 +163,14 @@ pub struct TextureMap {
 impl TextureMap {
     /// `channel` of `texture` by the first set of coordinates as they are.
     pub fn new(texture: TextureId, channel: TextureChannel) -> Self {
-        Self { texture, channel, uv_set: 0, texture_from_uv: Affine2::IDENTITY }
+        let (curve, texture_from_uv) = (Curve::Linear, Affine2::IDENTITY);
+        Self { texture, channel, curve, uv_set: 0, texture_from_uv }
+    }
+
+    /// What a scalar parameter is where the filtered texture is `texel`.
+    #[inline]
+    pub fn scalar(&self, texel: &Texel, factor: f32) -> f32 {
+        self.curve.at(factor * self.channel.of(texel))
     }
 
     /// Texture coordinates at the mesh's coordinates `uv`.
@@ -170,9 +191,11 @@ pub enum TextureChannel {
     B,
     /// Alpha: 1 where the image has none.
     A,
+    /// Luminance, by the weights of the Disney model.
+    Y,
 }
 
-named_variants! { TextureChannel { R "r", G "g", B "b", A "a", } }
+named_variants! { TextureChannel { R "r", G "g", B "b", A "a", Y "luminance", } }
 
 impl TextureChannel {
     /// This channel of a texel.
@@ -183,6 +206,37 @@ impl TextureChannel {
             Self::G => texel.color.g,
             Self::B => texel.color.b,
             Self::A => texel.alpha,
+            Self::Y => 0.3 * texel.color.r + 0.6 * texel.color.g + 0.1 * texel.color.b,
+        }
+    }
+}
+
+/// What a scalar parameter makes of a texture that holds another quantity. All are monotone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Curve {
+    /// The value itself.
+    #[default]
+    Linear,
+    /// `clearcoat_gloss` of a coat's roughness: (0.1 - r²)/0.099, as Disney's alpha is lerp(0.1, 0.001, gloss).
+    GlossOfRoughness,
+    /// `roughness` of Phong's exponent n: (2/(n+2))^¼, the Beckmann width of the Blinn-Phong lobe (Walter 2007).
+    RoughnessOfExponent,
+}
+
+named_variants! { Curve {
+    Linear "linear",
+    GlossOfRoughness "gloss_of_roughness",
+    RoughnessOfExponent "roughness_of_exponent",
+} }
+
+impl Curve {
+    /// The parameter where the texture times its factor is `value`.
+    #[inline]
+    pub fn at(self, value: f32) -> f32 {
+        match self {
+            Self::Linear => value,
+            Self::GlossOfRoughness => ((0.1 - value * value) / 0.099).clamp(0.0, 1.0),
+            Self::RoughnessOfExponent => Real::powf(2.0 / (value.max(0.0) + 2.0), 0.25),
         }
     }
 }
@@ -196,11 +250,13 @@ pub struct Emission {
     pub strength: f32,
     /// The sides it leaves.
     pub sides: Sides,
+    /// The camera alone sees it, times the vertex colour if that counts: it lights nothing.
+    pub unlit: bool,
 }
 
 impl Default for Emission {
     fn default() -> Self {
-        Self { color: Param::Constant(Rgb::BLACK), strength: 1.0, sides: Sides::Front }
+        Self { color: Param::Constant(Rgb::BLACK), strength: 1.0, sides: Sides::Front, unlit: false }
     }
 }
 

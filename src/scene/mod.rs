@@ -2,6 +2,7 @@
 //!
 //! Heavy data sits behind [`Arc`], so that the jobs of a sweep clone a scene for the price of its materials.
 
+mod anisotropy;
 pub mod camera;
 mod dump;
 pub mod environment;
@@ -18,6 +19,7 @@ use std::sync::Arc;
 use crate::color::Rgb;
 use glam::{Affine3A, Vec3};
 
+pub use anisotropy::{AnisotropyMap, DisneyAnisotropy};
 pub use camera::Camera;
 pub use environment::Environment;
 pub use light::Light;
@@ -103,6 +105,14 @@ impl<M> Scene<M> {
         }
         let texels = (f64::from(image.width) * f64::from(image.height)).max(1.0);
         texture::Texel { color: (color / texels).cast(), alpha: (alpha / texels) as f32 }
+    }
+
+    /// A scalar parameter's value, or its value at its texture's mean.
+    pub fn mean_scalar(&self, param: &material::Param<f32>) -> f32 {
+        match param {
+            material::Param::Constant(value) => *value,
+            material::Param::Texture { map, factor } => map.scalar(&self.mean_texel(map), *factor),
+        }
     }
 
     /// A scene with nothing in it.

@@ -111,7 +111,7 @@ pub fn is_lit(scene: &Scene<Material>) -> bool {
     let shines = |light: &Light| light.intensity > 0.0 && !light.color.is_black();
     let emits = |instance: &super::Instance| {
         let material = scene.materials.get(instance.material.0 as usize);
-        material.is_some_and(|m| m.item.emits() && m.item.emission.color.constant().is_some())
+        material.is_some_and(|m| m.item.is_light() && m.item.emission.color.constant().is_some())
             && !scene.mesh_of(instance).triangles.is_empty()
     };
     scene.lights.iter().any(|light| shines(&light.item))

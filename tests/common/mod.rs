@@ -21,7 +21,7 @@ pub(crate) fn lambert(albedo: f32) -> Material {
 /// `material` that also emits `radiance` on both sides.
 pub(crate) fn emitting(material: Material, radiance: f32) -> Material {
     let color = Param::Constant(Rgb::grey(radiance));
-    Material { emission: Emission { color, strength: 1.0, sides: Sides::Both }, ..material }
+    Material { emission: Emission { color, strength: 1.0, sides: Sides::Both, unlit: false }, ..material }
 }
 
 /// A closed sphere of flat triangles, facing outwards.

@@ -6,7 +6,7 @@ use crate::scene::source::{GltfDiffuseTransmission, GltfTransmission};
 
 fn run(source: &GltfMaterial) -> (Material, Vec<Note>) {
     let (mut notes, mut warnings) = (Vec::new(), Vec::new());
-    let material = convert("m", source, DiffuseModel::Burley, &mut notes, &mut warnings);
+    let material = convert("m", source, &ConvertOptions::default(), &mut notes, &mut warnings);
     (material, notes)
 }
 
@@ -37,7 +37,8 @@ fn the_core_maps_one_to_one() {
     assert_eq!(scalar(&material, Parameter::SheenTint), 0.0);
     assert_eq!(quality(&notes, "baseColorFactor"), Quality::Carried);
     let mut notes = Vec::new();
-    convert("m", &source, DiffuseModel::LambertFresnel, &mut notes, &mut Vec::new());
+    let options = ConvertOptions { diffuse: Some(DiffuseModel::LambertFresnel), ..Default::default() };
+    convert("m", &source, &options, &mut notes, &mut Vec::new());
     assert_eq!(quality(&notes, "baseColorFactor"), Quality::Exact);
 }
 
@@ -58,7 +59,8 @@ fn emission_leaves_both_sides_only_if_double_sided() {
     let source =
         GltfMaterial { emissive_factor: Rgb::grey(0.5), emissive_strength: 4.0, ..GltfMaterial::default() };
     let emission = run(&source).0.emission;
-    let expected = Emission { color: Param::Constant(Rgb::grey(0.5)), strength: 4.0, sides: Sides::Front };
+    let expected =
+        Emission { color: Param::Constant(Rgb::grey(0.5)), strength: 4.0, sides: Sides::Front, unlit: false };
     assert_eq!(emission, expected);
     let both = run(&GltfMaterial { double_sided: true, ..source }).0;
     assert_eq!((both.emission.sides, both.sides), (Sides::Both, Sides::Both));
@@ -108,17 +110,17 @@ fn specular_and_sheen_textures_multiply_what_they_scale() {
     let (material, notes) = run(&source(map(3), map(4)));
     assert_eq!(*material.scalar(Parameter::Specular), read(3, TextureChannel::A, 0.25));
     assert_eq!(*material.scalar(Parameter::F90), read(3, TextureChannel::A, 0.5));
-    assert_eq!(*material.scalar(Parameter::Sheen), read(9, TextureChannel::G, 1.0));
+    assert_eq!(*material.scalar(Parameter::Sheen), read(9, TextureChannel::Y, 1.0));
     assert_eq!(quality(&notes, "KHR_materials_specular.specularColorTexture"), Quality::Dropped);
     let (material, notes) = run(&source(None, map(4)));
-    assert_eq!(*material.scalar(Parameter::Specular), read(4, TextureChannel::G, 0.25));
+    assert_eq!(*material.scalar(Parameter::Specular), read(4, TextureChannel::Y, 0.25));
     assert_eq!(scalar(&material, Parameter::F90), 0.5);
     assert_eq!(quality(&notes, "KHR_materials_specular.specularColorTexture"), Quality::Approximated);
 }
 
 #[test]
 fn a_coat_of_factor_1_is_four_times_disneys() {
-    let coat = |roughness| GltfClearcoat { factor: 1.0, texture: None, roughness };
+    let coat = |roughness| GltfClearcoat { factor: 1.0, texture: None, roughness, roughness_texture: None };
     let with =
         |roughness| run(&GltfMaterial { clearcoat: Some(coat(roughness)), ..GltfMaterial::default() }).0;
     assert_eq!(scalar(&with(0.0), Parameter::Clearcoat), 4.0);
@@ -131,7 +133,7 @@ fn a_coat_of_factor_1_is_four_times_disneys() {
 #[test]
 fn anisotropy_gives_gltfs_two_alphas() {
     for (roughness, strength) in [(0.8f32, 0.5f32), (0.5, 0.6), (1.0, 1.0), (0.7, 0.0)] {
-        let anisotropy = Some(GltfAnisotropy { strength, rotation: 0.3 });
+        let anisotropy = Some(GltfAnisotropy { strength, rotation: 0.3, texture: None });
         let source = GltfMaterial { roughness_factor: roughness, anisotropy, ..GltfMaterial::default() };
         let (material, notes) = run(&source);
         // The parametrisation of disney.brdf.
@@ -144,11 +146,66 @@ fn anisotropy_gives_gltfs_two_alphas() {
         assert_eq!(material.rotation, 0.3);
         assert_eq!(quality(&notes, "KHR_materials_anisotropy"), Quality::Exact);
     }
-    let anisotropy = Some(GltfAnisotropy { strength: 1.0, rotation: 0.0 });
+    let anisotropy = Some(GltfAnisotropy { strength: 1.0, rotation: 0.0, texture: None });
     let (material, notes) =
         run(&GltfMaterial { roughness_factor: 0.0, anisotropy, ..GltfMaterial::default() });
     assert_eq!(scalar(&material, Parameter::Anisotropic), 1.0);
     assert_eq!(quality(&notes, "KHR_materials_anisotropy"), Quality::Approximated);
+}
+
+#[test]
+fn textures_of_coat_roughness_and_anisotropy_are_worked_out_at_each_point() {
+    let map = |id| TextureMap::new(TextureId(id), TextureChannel::R);
+    let source = GltfMaterial {
+        roughness_factor: 0.5,
+        clearcoat: Some(GltfClearcoat {
+            factor: 0.5,
+            texture: Some(map(1)),
+            roughness: 0.6,
+            roughness_texture: Some(map(2)),
+        }),
+        anisotropy: Some(GltfAnisotropy { strength: 0.7, rotation: 0.1, texture: Some(map(3)) }),
+        ..GltfMaterial::default()
+    };
+    let (material, notes) = run(&source);
+    let gloss = TextureMap { channel: TextureChannel::G, curve: Curve::GlossOfRoughness, ..map(2) };
+    assert_eq!(*material.scalar(Parameter::ClearcoatGloss), Param::Texture { map: gloss, factor: 0.6 });
+    assert_eq!(material.anisotropy, Some(AnisotropyMap { map: Some(map(3)), strength: 0.7 }));
+    assert_eq!(scalar(&material, Parameter::Roughness), 0.5, "glTF's own");
+    assert_eq!(quality(&notes, "KHR_materials_anisotropy.anisotropyTexture"), Quality::Exact);
+    // A textured roughness alone makes the terms vary.
+    let rough = GltfMaterial { metallic_roughness_texture: Some(map(4)), ..source };
+    let anisotropy = Some(GltfAnisotropy { strength: 0.7, rotation: 0.1, texture: None });
+    let (material, _) = run(&GltfMaterial { anisotropy, ..rough });
+    assert_eq!(material.anisotropy, Some(AnisotropyMap { map: None, strength: 0.7 }));
+}
+
+#[test]
+fn options_choose_the_coat_the_sheen_and_the_backs() {
+    let source = GltfMaterial {
+        clearcoat: Some(GltfClearcoat {
+            factor: 0.5,
+            texture: None,
+            roughness: 0.0,
+            roughness_texture: None,
+        }),
+        sheen: Some(GltfSheen { color: Rgb::grey(0.2), color_texture: None, roughness: 0.3 }),
+        ..GltfMaterial::default()
+    };
+    let with = |options: ConvertOptions, double_sided| {
+        let source = GltfMaterial { double_sided, ..source.clone() };
+        convert("m", &source, &options, &mut Vec::new(), &mut Vec::new())
+    };
+    let default = ConvertOptions::default;
+    let published = with(ConvertOptions { clearcoat: ClearcoatScale::Published, ..default() }, false);
+    assert_eq!(scalar(&published, Parameter::Clearcoat), 0.5);
+    assert!(!published.culled);
+    let scaled = with(ConvertOptions { sheen_scale: 3.0, ..default() }, false);
+    assert!((scalar(&scaled, Parameter::Sheen) - 0.6).abs() < 1e-6);
+    let brightest = with(ConvertOptions { sheen_scale: 30.0, ..default() }, false);
+    assert_eq!(scalar(&brightest, Parameter::Sheen), 1.0);
+    let cull = ConvertOptions { cull: true, ..default() };
+    assert!(with(cull.clone(), false).culled && !with(cull, true).culled);
 }
 
 #[test]

@@ -1,11 +1,15 @@
 //! The table of MTL statements, row by row.
 
+use std::f32::consts::TAU;
+
 use super::*;
+use crate::convert::PhongRoughness;
 use crate::scene::TextureId;
+use crate::scene::material::Curve;
 
 fn converted(source: &MtlMaterial) -> (Material, Vec<Note>, Vec<Warning>) {
     let (mut notes, mut warnings) = (Vec::new(), Vec::new());
-    let material = convert("m", source, &mut notes, &mut warnings);
+    let material = convert("m", source, &ConvertOptions::default(), &mut notes, &mut warnings);
     (material, notes, warnings)
 }
 
@@ -134,6 +138,7 @@ fn maps_multiply_and_their_options_act_on_v_upwards() {
     let mut map = MtlMap::new("a.png", 3);
     map.texture = Some(TextureId(0));
     (map.scale, map.offset) = (Vec2::new(2.0, 4.0), Vec2::new(0.5, 0.25));
+    map.bump_multiplier = 0.2;
     let missing = MtlMap::new("b.png", 4);
     let source = MtlMaterial {
         kd: Some(Rgb::grey(0.5)),
@@ -147,7 +152,52 @@ fn maps_multiply_and_their_options_act_on_v_upwards() {
     let uv = map.coordinates(Vec2::new(0.0, 1.0));
     assert!((uv - Vec2::new(0.5, 1.0 - 0.25)).length() < 1e-6, "{uv}");
     assert_eq!(quality(&notes, "map_d"), Some(Quality::Dropped));
-    assert_eq!(quality(&notes, "map_Bump"), Some(Quality::Dropped));
+    assert_eq!(quality(&notes, "map_Bump"), Some(Quality::Approximated));
+    let normals = material.normal_map.expect("slopes");
+    assert_eq!((normals.map.texture, normals.scale), (TextureId(0), 0.2));
+}
+
+#[test]
+fn maps_of_highlights_and_coats_vary_their_parameters() {
+    let loaded = |slot, id| {
+        let mut map = MtlMap::new("a.png", 3);
+        map.texture = Some(TextureId(id));
+        (slot, map)
+    };
+    let source = MtlMaterial {
+        ks: Some(Rgb::grey(0.5)),
+        ns: Some(100.0),
+        maps: vec![loaded(MtlSlot::Ks, 1), loaded(MtlSlot::Ns, 2)],
+        ..Default::default()
+    };
+    let read = |id, channel, curve, factor| {
+        let map = TextureMap { curve, ..TextureMap::new(TextureId(id), channel) };
+        Param::Texture { map, factor }
+    };
+    let (material, notes, _) = converted(&source);
+    assert_eq!(*material.scalar(Parameter::Specular), read(1, TextureChannel::Y, Curve::Linear, 0.5));
+    let exponent = read(2, TextureChannel::R, Curve::RoughnessOfExponent, 100.0);
+    assert_eq!(*material.scalar(Parameter::Roughness), exponent);
+    assert_eq!(quality(&notes, "map_Ks"), Some(Quality::Approximated));
+    // As Blender reads them: the map is the roughness.
+    let blender = ConvertOptions { phong: PhongRoughness::Blender, ..Default::default() };
+    let mut notes = Vec::new();
+    let material = convert("m", &source, &blender, &mut notes, &mut Vec::new());
+    assert_eq!(*material.scalar(Parameter::Roughness), read(2, TextureChannel::R, Curve::Linear, 1.0));
+    assert_eq!(quality(&notes, "Ns"), Some(Quality::Dropped));
+    let plain = MtlMaterial { maps: Vec::new(), ns: Some(250.0), ..source };
+    let material = convert("m", &plain, &blender, &mut Vec::new(), &mut Vec::new());
+    assert_eq!(constant(&material, Parameter::Roughness), 0.5);
+
+    let coat = MtlMaterial {
+        pc: Some(0.5),
+        maps: vec![loaded(MtlSlot::Pc, 3), loaded(MtlSlot::Pcr, 4)],
+        ..Default::default()
+    };
+    let (material, ..) = converted(&coat);
+    assert_eq!(*material.scalar(Parameter::Clearcoat), read(3, TextureChannel::R, Curve::Linear, 1.0));
+    let gloss = read(4, TextureChannel::R, Curve::GlossOfRoughness, 1.0);
+    assert_eq!(*material.scalar(Parameter::ClearcoatGloss), gloss);
 }
 
 #[test]

@@ -200,9 +200,12 @@ impl Reader<'_, '_> {
                         json.clearcoat_roughness_factor,
                         Limits::Unit,
                     )?,
+                    roughness_texture: self.info(
+                        json.clearcoat_roughness_texture.as_ref(),
+                        Encoding::Linear,
+                        "clearcoatRoughnessTexture",
+                    )?,
                 });
-                let roughness = json.clearcoat_roughness_texture.as_ref();
-                self.skip(roughness, "KHR_materials_clearcoat.clearcoatRoughnessTexture");
                 if json.clearcoat_normal_texture.is_some() {
                     self.unread.push("KHR_materials_clearcoat.clearcoatNormalTexture".into());
                 }
@@ -229,8 +232,12 @@ impl Reader<'_, '_> {
                 material.anisotropy = Some(GltfAnisotropy {
                     strength: self.number("anisotropyStrength", json.anisotropy_strength, Limits::Unit)?,
                     rotation: self.number("anisotropyRotation", json.anisotropy_rotation, Limits::Finite)?,
+                    texture: self.info(
+                        json.anisotropy_texture.as_ref(),
+                        Encoding::Linear,
+                        "anisotropyTexture",
+                    )?,
                 });
-                self.skip(json.anisotropy_texture.as_ref(), "KHR_materials_anisotropy.anisotropyTexture");
             }
             "KHR_materials_transmission" => {
                 let json: Transmission = parse(json)?;

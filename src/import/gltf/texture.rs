@@ -111,7 +111,7 @@ impl<'a> Textures<'a> {
                 });
             }
         }
-        Ok(TextureMap { texture, channel: TextureChannel::R, uv_set, texture_from_uv })
+        Ok(TextureMap { uv_set, texture_from_uv, ..TextureMap::new(texture, TextureChannel::R) })
     }
 
     /// Columns and rows of a texture that was made.

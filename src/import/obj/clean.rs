@@ -2,12 +2,16 @@
 //!
 //! Every statement is checked here: continued lines are joined, points, lines and free-form geometry left out, relative
 //! indices resolved, indices checked against what the file holds, vertex colours given to all vertices or none, and vertices
-//! stand before faces. Texture coordinates and normals that are missing or unreadable refer to a first entry that is NaN.
+//! stand before faces. Texture coordinates and normals that are missing or unreadable refer to a first entry that is NaN, corners
+//! in smoothing groups to normals made for them.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use glam::Vec3;
+
+use super::smoothing::SmoothNormals;
 use super::{Grouping, ObjError};
 use crate::record::Warning;
 
@@ -22,8 +26,6 @@ pub(super) struct Cleaned {
     pub libraries: Vec<(String, u32)>,
     /// Whether vertices have colours.
     pub colored: bool,
-    /// The line of the first smoothing group.
-    pub smoothing: Option<u32>,
 }
 
 /// Faces that share object and material.
@@ -47,6 +49,7 @@ pub(super) enum Flaw {
     UvUnreadable,
     NormalUnreadable,
     ColorUnreadable,
+    SmoothingUnreadable,
     NotSurface,
     FreeForm,
     Unknown,
@@ -63,6 +66,9 @@ impl Flaw {
             Self::UvUnreadable => "texture coordinate without finite numbers; read as missing",
             Self::NormalUnreadable => "normal without direction; the face's own is taken",
             Self::ColorUnreadable => "vertex colour without three finite numbers; read as white",
+            Self::SmoothingUnreadable => {
+                "smoothing group without a whole number; the faces after it are flat"
+            }
             Self::NotSurface => "point or line left out: only surfaces are rendered",
             Self::FreeForm => "free-form curve or surface left out: only polygons are read",
             Self::Unknown => "unknown statement left out",
@@ -111,13 +117,15 @@ pub(super) fn clean(
         object: String::new(),
         material: None,
         current: None,
+        smoothing: None,
+        smooth: SmoothNormals::default(),
     };
     for (line, statement) in statements(text) {
         faces.read(line, &statement, &mut flaws)?;
     }
-    let mut out = faces.out;
+    let Faces { mut out, smooth, .. } = faces;
     out.colored = vertices.colored;
-    out.stream = vertices.into_stream();
+    out.stream = vertices.into_stream(smooth);
     for (i, group) in out.groups.iter_mut().enumerate() {
         // Writing to a string cannot fail.
         let _ = writeln!(out.stream, "o {i}");
@@ -182,6 +190,8 @@ struct Vertices {
     positions: String,
     uvs: String,
     normals: String,
+    /// The positions as numbers, in the order of `positions`.
+    points: Vec<Vec3>,
     /// Indices of vertices that are not finite, ascending.
     bad: Vec<usize>,
     colored: bool,
@@ -259,16 +269,21 @@ impl Vertices {
             let _ = write!(self.positions, " {r} {g} {b}");
         }
         self.positions.push('\n');
+        self.points.push(Vec3::new(x, y, z));
         self.counts.positions += 1;
     }
 
-    /// The stream so far, with the entries for what is missing first.
-    fn into_stream(self) -> String {
+    /// The stream so far: the entries for what is missing first, the normals made for smoothing groups last.
+    fn into_stream(self, smooth: SmoothNormals) -> String {
         let mut stream = self.positions;
         stream.push_str("vt NaN NaN\n");
         stream.push_str(&self.uvs);
         stream.push_str("vn NaN NaN NaN\n");
         stream.push_str(&self.normals);
+        for normal in smooth.into_normals() {
+            let Vec3 { x, y, z } = normal.unwrap_or(Vec3::NAN);
+            let _ = writeln!(stream, "vn {x} {y} {z}");
+        }
         stream
     }
 }
@@ -286,6 +301,9 @@ struct Faces<'a> {
     material: Option<String>,
     /// The group of the last face, while object and material stay.
     current: Option<usize>,
+    /// The smoothing group of the faces that follow.
+    smoothing: Option<u32>,
+    smooth: SmoothNormals,
 }
 
 impl Faces<'_> {
@@ -311,11 +329,9 @@ impl Faces<'_> {
             | "hole" | "scrv" | "sp" | "end" | "con" | "bzp" | "bsp" | "cdc" | "cdp" | "res" => {
                 flaws.add(Flaw::FreeForm, line)
             }
-            "s" if !matches!(rest, "off" | "0" | "") => {
-                self.out.smoothing.get_or_insert(line);
-            }
+            "s" => self.smoothing(line, rest, flaws),
             // Merging groups, display attributes.
-            "s" | "mg" | "bevel" | "c_interp" | "d_interp" | "lod" | "usemap" | "maplib" | "shadow_obj"
+            "mg" | "bevel" | "c_interp" | "d_interp" | "lod" | "usemap" | "maplib" | "shadow_obj"
             | "trace_obj" | "ctech" | "stech" => {}
             _ => flaws.add(Flaw::Unknown, line),
         }
@@ -323,27 +339,55 @@ impl Faces<'_> {
     }
 
     fn face(&mut self, line: u32, rest: &str, flaws: &mut Flaws) -> Result<(), ObjError> {
-        let group = self.group(line);
-        let faces = &mut self.out.groups[group].faces;
-        let start = faces.len();
-        faces.push('f');
-        let (mut corners, mut bad) = (0, false);
+        let mut corners = Vec::with_capacity(4);
         for word in words(rest) {
             let corner = Corner::parse(word, self.seen, self.vertices.counts)
                 .map_err(|flaw| flaw.at(self.name, line, word, self.vertices.counts))?;
-            bad |= self.vertices.bad.binary_search(&corner.position).is_ok();
-            // The first coordinate and normal of the stream stand for missing ones.
-            let shifted = |i: Option<usize>| i.map_or(1, |i| i + 2);
-            let _ =
-                write!(faces, " {}/{}/{}", corner.position + 1, shifted(corner.uv), shifted(corner.normal));
-            corners += 1;
+            corners.push(corner);
         }
-        faces.push('\n');
-        if corners < 3 || bad {
-            faces.truncate(start);
-            flaws.add(if bad { Flaw::FaceOfBadVertex } else { Flaw::FaceTooSmall }, line);
+        let is_bad = |corner: &Corner| self.vertices.bad.binary_search(&corner.position).is_ok();
+        if corners.iter().any(is_bad) {
+            flaws.add(Flaw::FaceOfBadVertex, line);
+        } else if corners.len() < 3 {
+            flaws.add(Flaw::FaceTooSmall, line);
+        } else {
+            self.write(line, &corners);
         }
         Ok(())
+    }
+
+    /// Adds a face to its group.
+    fn write(&mut self, line: u32, corners: &[Corner]) {
+        if let Some(smoothing) = self.smoothing {
+            let positions: Vec<usize> = corners.iter().map(|corner| corner.position).collect();
+            self.smooth.add(&positions, &self.vertices.points, smoothing);
+        }
+        let group = self.group(line);
+        let faces = &mut self.out.groups[group].faces;
+        faces.push('f');
+        for corner in corners {
+            let smooth = || {
+                self.smoothing.map(|s| self.vertices.counts.normals + self.smooth.index(corner.position, s))
+            };
+            let normal = corner.normal.or_else(smooth);
+            // The first coordinate and normal of the stream stand for missing ones.
+            let shifted = |i: Option<usize>| i.map_or(1, |i| i + 2);
+            let _ = write!(faces, " {}/{}/{}", corner.position + 1, shifted(corner.uv), shifted(normal));
+        }
+        faces.push('\n');
+    }
+
+    /// `s`: a group by its number, `on` as 1. A file read as one mesh has the normals that it gives, and no others.
+    fn smoothing(&mut self, line: u32, rest: &str, flaws: &mut Flaws) {
+        let group = match words(rest).next() {
+            None | Some("off") => Some(0),
+            Some("on") => Some(1),
+            Some(number) => number.parse().ok(),
+        };
+        if group.is_none() {
+            flaws.add(Flaw::SmoothingUnreadable, line);
+        }
+        self.smoothing = group.filter(|&g| g > 0 && self.grouping == Grouping::ByObjectAndMaterial);
     }
 
     /// The index of the group that faces now belong to.

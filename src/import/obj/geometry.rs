@@ -62,13 +62,6 @@ pub(super) fn read(
     if parts.is_empty() {
         return Err(ObjError::NoFaces { file: name.to_owned() });
     }
-    if let Some(line) = cleaned.smoothing
-        && grouping == Grouping::ByObjectAndMaterial
-        && parts.iter().any(|part| part.mesh.normals.is_empty())
-    {
-        let what = "smoothing groups are not read: faces without normals are flat";
-        warnings.push(Warning::new(format!("{name}:{line}"), what));
-    }
     Ok(Geometry { parts, libraries: cleaned.libraries })
 }
 

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::heights;
 use crate::import::Files;
 use crate::import::images::decode_image;
 use crate::record::Warning;
-use crate::scene::source::{MtlMaterial, MtlSlot};
+use crate::scene::material::TextureChannel;
+use crate::scene::source::{MtlMap, MtlMaterial, MtlSlot};
 use crate::scene::texture::{Encoding, TexelFilter, Wrap};
 use crate::scene::{Image, ImageId, Texture, TextureId};
 
@@ -74,6 +76,8 @@ pub(super) struct Maps {
     pub images: Vec<Arc<Image>>,
     pub textures: Vec<Texture>,
     by_file: BTreeMap<String, Option<ImageId>>,
+    /// The normals of heights, by image, channel and what is beyond its edge.
+    of_heights: BTreeMap<(ImageId, &'static str, &'static str), ImageId>,
 }
 
 impl Maps {
@@ -98,6 +102,7 @@ impl Maps {
             }
             let Some(image) = self.image(files, &found.name, &mut warn) else { continue };
             map.has_alpha = matches!(self.images[image.0 as usize].channels, 2 | 4);
+            let image = if *slot == MtlSlot::Bump { self.normals(image, map) } else { image };
             map.texture = Some(self.texture(image, encoding(*slot), map.wrap));
         }
     }
@@ -131,6 +136,22 @@ impl Maps {
         id
     }
 
+    /// The normals of a bump map's image: its own, or those of the heights that it holds.
+    fn normals(&mut self, image: ImageId, map: &mut MtlMap) -> ImageId {
+        let source = &self.images[image.0 as usize];
+        map.holds_normals = map.channel.is_none() && heights::are_normals(source);
+        if map.holds_normals {
+            return image;
+        }
+        let channel = map.channel.unwrap_or(TextureChannel::Y);
+        let next = ImageId(self.images.len() as u32);
+        let known = *self.of_heights.entry((image, channel.name(), map.wrap.name())).or_insert(next);
+        if known == next {
+            self.images.push(Arc::new(heights::normals(source, channel, map.wrap)));
+        }
+        known
+    }
+
     fn texture(&mut self, image: ImageId, encoding: Encoding, wrap: Wrap) -> TextureId {
         let texture = Texture { image, encoding, wrap: [wrap; 2], filter: TexelFilter::Bilinear };
         let at = self.textures.iter().position(|t| *t == texture).unwrap_or_else(|| {
@@ -144,7 +165,7 @@ impl Maps {
 /// Colours are encoded as displays want them, everything else holds numbers.
 const fn encoding(slot: MtlSlot) -> Encoding {
     match slot {
-        MtlSlot::Kd | MtlSlot::Ke => Encoding::Srgb,
+        MtlSlot::Kd | MtlSlot::Ks | MtlSlot::Ke => Encoding::Srgb,
         _ => Encoding::Linear,
     }
 }

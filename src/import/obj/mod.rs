@@ -2,14 +2,16 @@
 //!
 //! `clean` makes a stream that `tobj` reads, `geometry` and `polygon` turn its faces into triangles, `mtl` reads the libraries,
 //! and `maps` finds and loads what they name. Faces of one object (or group) and material become a mesh and an instance, in
-//! the order of the file. Meshes without normals are flat: smoothing groups are not read. The file's v goes upwards and is
-//! turned; its vertex colours are taken as sRGB and used where the file names no material.
+//! the order of the file. Corners without normals take those of their smoothing group, or are flat. The file's v goes upwards and
+//! is turned; its vertex colours are taken as sRGB and used where the file names no material.
 
 mod clean;
 mod geometry;
+mod heights;
 mod maps;
 mod mtl;
 mod polygon;
+mod smoothing;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -71,12 +71,48 @@ fn missing_normals_are_the_faces_own_where_others_are_given() {
     assert!(mesh.normals.iter().all(|&n| n == Vec3::Z), "{:?}", mesh.normals);
 }
 
+/// A ridge: two quads that meet at right angles along the y axis, each cut into faces by `cut`.
+fn ridge(cut: &str) -> String {
+    format!("v 0 0 0\nv 0 1 0\nv 1 1 -1\nv 1 0 -1\nv -1 0 -1\nv -1 1 -1\n{cut}")
+}
+
 #[test]
-fn smoothing_without_normals_is_told() {
-    let (scene, warnings) = ok(&format!("{QUAD}s off\ns 1\nf 1 2 3\n"));
-    assert!(scene.meshes[0].normals.is_empty());
-    assert!(warnings.len() == 1 && warnings[0].place == "a.obj:6", "{warnings:?}");
-    assert!(ok(&format!("{QUAD}vn 0 0 1\ns 1\nf 1//1 2//1 3//1\n")).1.is_empty());
+fn smoothing_groups_give_the_mean_normal_however_faces_are_cut() {
+    let up_at_ridge = |obj: &str| {
+        let (scene, warnings) = ok(obj);
+        assert!(warnings.is_empty(), "{warnings:?}");
+        for mesh in &scene.meshes {
+            assert_eq!(mesh.normals.len(), mesh.positions.len());
+            for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
+                let expected = Vec3::new(p.x.signum() * f32::from(p.x != 0.0), 0.0, 1.0).normalize();
+                assert!((*n - expected).length() < 1e-6, "{obj}: {p} {n}");
+            }
+        }
+    };
+    up_at_ridge(&ridge("s 1\nf 1 4 3 2\nf 1 2 6 5\n"));
+    up_at_ridge(&ridge("s on\nf 1 4 3\nf 1 3 2\nf 1 2 6 5\n"));
+    // Smoothing goes across materials.
+    up_at_ridge(&ridge("s 7\nusemtl a\nf 1 4 3 2\nusemtl b\nf 1 2 6 5\n").replace("usemtl", "g"));
+}
+
+#[test]
+fn edges_between_smoothing_groups_stay_sharp_and_given_normals_stay() {
+    let (scene, _) = ok(&ridge("s 1\nf 1 4 3 2\ns 2\nf 1 2 6 5\n"));
+    for n in &scene.meshes[0].normals {
+        assert!((n.x.abs() - 0.5_f32.sqrt()).abs() < 1e-6, "{n}");
+    }
+    let (scene, _) = ok(&ridge("vn 0 1 0\ns 1\nf 1//1 4 3 2\nf 1//1 2 6 5\n"));
+    assert_eq!(scene.meshes[0].normals[0], Vec3::Y);
+    assert_eq!(scene.meshes[0].normals[3], Vec3::Z);
+    assert!(ok(&ridge("s 1\ns off\nf 1 4 3 2\n")).0.meshes[0].normals.is_empty());
+    let (scene, warnings) = ok(&ridge("s 1\ns blub\nf 1 4 3 2\n"));
+    assert!(scene.meshes[0].normals.is_empty() && warnings[0].place == "a.obj:8", "{warnings:?}");
+}
+
+#[test]
+fn faces_back_to_back_in_one_smoothing_group_are_flat() {
+    let (scene, _) = ok(&format!("{QUAD}s 1\nf 1 2 3\nf 3 2 1\n"));
+    assert!(scene.meshes[0].normals.is_empty(), "{:?}", scene.meshes[0].normals);
 }
 
 #[test]
@@ -158,17 +194,18 @@ fn libraries_and_maps_are_found_and_missing_ones_told() {
     let mut png = std::io::Cursor::new(Vec::new());
     let pixels = image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 0, 0, 128]));
     image::DynamicImage::ImageRgba8(pixels).write_to(&mut png, image::ImageFormat::Png).unwrap();
-    let library = b"newmtl unused\nnewmtl red paint\nKd 1 0 0\nmap_Kd Wood.PNG\nmap_d wood.png\nmap_Pr gone.png\nmap_Ks wood.png\n";
+    let library = b"newmtl unused\nnewmtl red paint\nKd 1 0 0\nmap_Kd Wood.PNG\nmap_d wood.png\nmap_Pr gone.png\nmap_Ka wood.png\nmap_Bump -imfchan r wood.png\n";
     let text = format!("mtllib My Lib.MTL\nmtllib gone.mtl\n{QUAD}usemtl red paint\nf 1 2 3 4\n");
     let (scene, warnings) =
         import_with(&text, &[("my lib.mtl", library), ("wood.png", &png.into_inner())]).unwrap();
     assert_eq!(scene.materials.len(), 1, "unused materials are left out");
     let material = mtl(&scene, "red paint");
     assert_eq!(material.kd, Some(Rgb::new(1.0, 0.0, 0.0)));
-    assert_eq!((scene.images.len(), scene.textures.len()), (1, 2), "one image, sRGB and linear");
+    assert_eq!((scene.images.len(), scene.textures.len()), (2, 3), "one image, sRGB, linear, and its slopes");
+    assert_eq!(scene.images[1].name, "wood-normals.png");
     assert!(material.map(MtlSlot::D).unwrap().has_alpha);
     assert!(material.map(MtlSlot::Kd).unwrap().texture.is_some());
-    assert!(material.map(MtlSlot::Ks).unwrap().texture.is_none(), "not read, so not loaded");
+    assert!(material.map(MtlSlot::Ka).unwrap().texture.is_none(), "not read, so not loaded");
     let text: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     assert_eq!(text.len(), 2, "{text:?}");
     assert!(text[0].starts_with("a.obj:2: material library \"gone.mtl\" is not there"), "{text:?}");

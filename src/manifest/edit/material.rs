@@ -8,11 +8,15 @@ use crate::record::Value;
 use crate::scene::Material;
 use crate::scene::material::Param;
 
-/// Sets one field. A constant takes the place of a texture, and a base colour that of vertex colours.
+/// Sets one field. A constant takes the place of a texture, a base colour that of vertex colours, and
+/// `anisotropic` that of glTF's anisotropy.
 pub(super) fn set(material: &mut Material, field: MaterialField, value: &Value) -> Result<Outcome, Mismatch> {
     if let Some(parameter) = field.parameter() {
         let number = parameter.check(value::any_number(value)?).map_err(|_| Mismatch)?;
         *material.scalar_mut(parameter) = Param::Constant(number);
+        if field == MaterialField::Anisotropic {
+            material.anisotropy = None;
+        }
         return Ok(Outcome::Set);
     }
     match field {

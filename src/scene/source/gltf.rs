@@ -99,6 +99,8 @@ pub struct GltfClearcoat {
     pub texture: Option<TextureMap>,
     /// `clearcoatRoughnessFactor`, in [0, 1].
     pub roughness: f32,
+    /// `clearcoatRoughnessTexture`: its green channel multiplies the roughness.
+    pub roughness_texture: Option<TextureMap>,
 }
 
 /// KHR_materials_sheen.
@@ -108,17 +110,19 @@ pub struct GltfSheen {
     pub color: Rgb,
     /// `sheenColorTexture`, sRGB.
     pub color_texture: Option<TextureMap>,
-    /// `sheenRoughnessFactor`, in [0, 1].
+    /// `sheenRoughnessFactor`, in [0, 1]. Its texture is not read: no lobe here has a roughness of sheen.
     pub roughness: f32,
 }
 
-/// KHR_materials_anisotropy, its constant factors.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// KHR_materials_anisotropy.
+#[derive(Clone, Debug, PartialEq)]
 pub struct GltfAnisotropy {
     /// `anisotropyStrength`, in [0, 1].
     pub strength: f32,
     /// `anisotropyRotation`, counter-clockwise from the tangent, in radians.
     pub rotation: f32,
+    /// `anisotropyTexture`: direction in red and green, in blue what multiplies the strength.
+    pub texture: Option<TextureMap>,
 }
 
 /// KHR_materials_transmission.
@@ -192,7 +196,7 @@ impl GltfMaterial {
     /// The set of texture coordinates that the surface's tangents follow, if the material depends on them.
     pub fn tangent_set(&self) -> Option<u32> {
         let normal = self.normal_texture.as_ref().map(|map| map.uv_set);
-        normal.or_else(|| self.anisotropy.map(|_| 0))
+        normal.or_else(|| self.anisotropy.as_ref().map(|_| 0))
     }
 
     /// Every texture that is read, with the field it stands in.

@@ -111,6 +111,8 @@ pub struct MtlMap {
     pub channel: Option<TextureChannel>,
     /// Whether the image holds alpha.
     pub has_alpha: bool,
+    /// Of a bump map: whether the image is one of normals, as many exporters write.
+    pub holds_normals: bool,
 }
 
 impl MtlMap {
@@ -126,6 +128,7 @@ impl MtlMap {
             wrap: Wrap::Repeat,
             channel: None,
             has_alpha: false,
+            holds_normals: false,
         }
     }
 }
@@ -183,7 +186,7 @@ impl MtlSlot {
 
     /// Whether the conversion reads it; maps of other slots are not loaded.
     pub const fn is_read(self) -> bool {
-        matches!(self, Self::Kd | Self::Ke | Self::D | Self::Pr | Self::Pm | Self::Norm)
+        !matches!(self, Self::Ka | Self::Disp | Self::Decal | Self::Refl)
     }
 }
 
