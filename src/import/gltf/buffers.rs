@@ -36,13 +36,16 @@ impl<'a> Buffers<'a> {
                 None if i == 0 && document.blob.is_some() => {
                     loaded.push(Cow::Borrowed(document.blob.unwrap_or_default()))
                 }
-                None if document.root.extensions_used.iter().any(|e| e == meshopt::EXTENSION) => {
+                None if meshopt::is_used(&document.root.extensions_used) => {
                     // A placeholder: what lies in it is decompressed from elsewhere.
                     let empty = loaded.push(Cow::Borrowed(&[]));
                     loaded.buffers.push((empty, 0));
                     continue;
                 }
-                None => return Err(without_data(document, element)),
+                None => {
+                    let property = "uri, and the file no binary chunk";
+                    return Err(GltfError::Missing { element, property });
+                }
                 Some(uri) => match resolve(uri, &element)? {
                     Target::Data(bytes) => loaded.push(Cow::Owned(bytes)),
                     Target::File(name) => match by_name.get(&name) {
@@ -84,7 +87,7 @@ impl<'a> Buffers<'a> {
         Ok(())
     }
 
-    /// Decompresses every view of `root` that EXT_meshopt_compression has packed: it then lies in a buffer of its own.
+    /// Decompresses every view of `root` that meshopt has packed: it then lies in a buffer of its own.
     pub(super) fn decompress(&mut self, root: &mut Root) -> Result<(), GltfError> {
         for (i, view) in root.buffer_views.iter_mut().enumerate() {
             let Some(packed) = Compressed::of(view)? else { continue };
@@ -176,13 +179,4 @@ pub(super) fn resolve(uri: &str, element: &str) -> Result<Target, GltfError> {
 /// The file that `element` names.
 pub(super) fn read_file(files: &mut Files, name: &str, element: &str) -> Result<Vec<u8>, GltfError> {
     files.read(name).map_err(|cause| GltfError::File { element: element.to_owned(), cause })
-}
-
-/// A buffer without data: a placeholder for what only an extension can read, or a mistake.
-fn without_data(document: &Document, element: String) -> GltfError {
-    let extension = "KHR_meshopt_compression";
-    if document.root.extensions_used.iter().any(|e| e == extension) {
-        return GltfError::Extension { element, extension };
-    }
-    GltfError::Missing { element, property: "uri, and the file no binary chunk" }
 }
