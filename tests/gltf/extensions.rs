@@ -4,8 +4,9 @@ use std::path::Path;
 
 use glam::Vec3;
 use pipeline::import::{GltfError, ImportError, ImportOptions, Imported, import_bytes};
+use pipeline::scene::environment::{EnvironmentMap, Equirectangular};
 use pipeline::scene::source::SourceMaterial;
-use pipeline::scene::texture::Pixels;
+use pipeline::scene::texture::{Encoding, Pixels};
 use serde_json::{Value, json};
 
 use crate::sample::{Bin, error_of, minimal, read};
@@ -180,4 +181,45 @@ fn specular_and_glossiness_become_metallic_and_roughness() {
     assert!(matches!(error, GltfError::Factor { field: "glossinessFactor", .. }), "{error}");
     let error = error_of(&specular_glossiness(json!({"diffuseTexture": {"index": 7}})));
     assert!(matches!(error, GltfError::Reference { .. }), "{error}");
+}
+
+#[test]
+fn a_cube_map_surrounds_the_scene() {
+    let lit = |edit: &dyn Fn(&mut Value)| {
+        minimal(|json, bin| {
+            // Six faces of one colour each, brighter with the index.
+            let images = (0..6u8).map(|i| {
+                let mut png = std::io::Cursor::new(Vec::new());
+                let face = image::RgbImage::from_pixel(4, 4, image::Rgb([40 * i + 40, 0, 0]));
+                image::DynamicImage::ImageRgb8(face).write_to(&mut png, image::ImageFormat::Png).unwrap();
+                json!({"bufferView": bin.view(png.get_ref()), "mimeType": "image/png"})
+            });
+            json["images"] = images.collect();
+            let mut light = json!({"intensity": 2.0, "rotation": [0.0, 0.70710678, 0.0, 0.70710678],
+                "irradianceCoefficients": [], "specularImageSize": 4, "specularImages": [[0, 1, 2, 3, 4, 5]]});
+            edit(&mut light);
+            json["extensions"]["EXT_lights_image_based"] = json!({"lights": [light]});
+            json["scenes"][0]["extensions"]["EXT_lights_image_based"] = json!({"light": 0});
+            json["extensionsUsed"] = json!(["EXT_lights_image_based"]);
+        })
+    };
+    let scene = read("a.glb", &lit(&|_| ())).unwrap().scene;
+    let environment = scene.environment.as_ref().expect("surroundings");
+    assert_eq!(environment.intensity, 2.0);
+    let EnvironmentMap::Image { image, mapping: Equirectangular::YUp } = environment.map else { panic!() };
+    let image = &scene.images[image.0 as usize];
+    assert_eq!((image.width, image.height), (16, 8));
+    let brightness = |x: u32, y: u32| {
+        let linear = image.texel(x, y, Encoding::Linear).color.r;
+        (pipeline::color::srgb_from_linear(linear) * 255.0).round() as u32
+    };
+    // A quarter turn about y carries +z (face 4) to +x, the middle column; +x (face 0) to -z, three eighths of a turn before it.
+    assert_eq!(brightness(8, 4), 200);
+    assert_eq!(brightness(4, 4), 40, "-z");
+    assert_eq!(brightness(0, 0), 120, "+y");
+    let error = |edit: &dyn Fn(&mut Value)| read("a.glb", &lit(edit)).unwrap_err().to_string();
+    let text = error(&|light| light["specularImages"] = json!([[0, 1]]));
+    assert!(text.contains("EXT_lights_image_based.lights[0]") && text.contains("six images"), "{text}");
+    assert!(error(&|light| light["rotation"] = json!([0, 0, 0, 5])).contains("unit quaternion"));
+    assert!(error(&|light| light["specularImages"] = json!([[0, 1, 2, 3, 4, 77]])).contains("images"));
 }

@@ -7,6 +7,7 @@ use super::error::GltfError;
 
 /// The extensions that are read, or dropped with a note. A file that requires another one is refused.
 pub(super) const EXTENSIONS: &[&str] = &[
+    "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",

@@ -15,6 +15,7 @@ mod deform;
 mod draco;
 mod error;
 mod geometry;
+mod image_based;
 mod instancing;
 mod material;
 mod meshopt;
@@ -71,9 +72,13 @@ pub(super) fn import(
     let mut scene = Scene::empty();
     let mut textures = Textures::new(root, &buffers, files);
     let materials = read_materials(root, variant, &mut textures)?;
+    let surroundings = image_based::read(root, &mut textures)?;
     let replaced;
     (scene.textures, scene.images, replaced) = textures.finish();
     warnings.extend(replaced);
+    if let Some(surroundings) = surroundings {
+        surroundings.light(&mut scene);
+    }
 
     let geometry = Geometry::new(accessors, name);
     let mut worlds = vec![None; root.nodes.len()];

@@ -185,6 +185,15 @@ impl<'a> Textures<'a> {
         if let Some(&id) = self.by_source.get(&index) {
             return Ok(id);
         }
+        let image = self.decode(index, element)?;
+        let id = ImageId(self.images.len() as u32);
+        self.images.push(Arc::new(image));
+        self.by_source.insert(index, id);
+        Ok(id)
+    }
+
+    /// `images[index]`, of which `element` speaks, for a use of its own.
+    pub(super) fn decode(&mut self, index: usize, element: &str) -> Result<Image, GltfError> {
         let json = lookup(&self.root.images, index, element, "images")?;
         let element = format!("images[{index}]");
         let name = |fallback: &str| json.name.clone().unwrap_or_else(|| fallback.to_owned());
@@ -205,10 +214,7 @@ impl<'a> Textures<'a> {
             Pixels::U16(v) => v.len() as u64 * 2,
             Pixels::F32(v) => v.len() as u64 * 4,
         })?;
-        let id = ImageId(self.images.len() as u32);
-        self.images.push(Arc::new(image));
-        self.by_source.insert(index, id);
-        Ok(id)
+        Ok(image)
     }
 }
 
