@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::render::parse_enum;
-use super::{FAILED, Outcome, Talk, WELL, print, tell};
+use super::{Allowed, FAILED, Outcome, Talk, WELL, print, tell};
 use crate::convert::ConvertOptions;
 use crate::disney::DiffuseModel;
 use crate::export::{self, Exported, Input, Target, export};
@@ -32,6 +32,8 @@ pub(super) struct Arguments {
     /// root with meshes, of constants alone.
     #[arg(long, value_name = "TARGET", value_parser = parse_target, default_value = "library")]
     to: Target,
+    #[command(flatten)]
+    allowed: Allowed,
     /// How to tell what became of the materials, on stdout.
     #[arg(long, value_enum, default_value_t = Report::Table)]
     report: Report,
@@ -56,8 +58,9 @@ fn parse_target(text: &str) -> Result<Target, String> {
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let inputs = export::inputs(&arguments.scenes, &output(arguments))?;
-    let options = ConvertOptions { diffuse: arguments.diffuse };
-    let (exported, failed) = convert_all(&inputs, arguments.to, &options, talk);
+    let import_options = ImportOptions { reach: arguments.allowed.reach(), ..ImportOptions::default() };
+    let options = (&import_options, &ConvertOptions { diffuse: arguments.diffuse });
+    let (exported, failed) = convert_all(&inputs, arguments.to, options, talk);
     for warning in exported.iter().flat_map(|e| &e.warnings) {
         talk.say(&format!("warning: {warning}"));
     }
@@ -83,7 +86,7 @@ type Failures = Vec<(PathBuf, export::ExportError)>;
 fn convert_all(
     inputs: &[Input],
     target: Target,
-    options: &ConvertOptions,
+    (import_options, convert_options): (&ImportOptions, &ConvertOptions),
     talk: Talk,
 ) -> (Vec<Exported>, Failures) {
     let bar = match (talk, inputs.len()) {
@@ -97,7 +100,7 @@ fn convert_all(
         .par_iter()
         .map(|input| {
             bar.set_message(input.source.display().to_string());
-            let result = export(&input.source, &input.folder, target, &ImportOptions::default(), options);
+            let result = export(&input.source, &input.folder, target, import_options, convert_options);
             bar.inc(1);
             result.map_err(|error| (input.source.clone(), error))
         })

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use self::config_root::{Outputs, Shown};
 use super::progress::Progress;
-use super::{Outcome, Talk, WELL, print};
+use super::{Allowed, Outcome, Talk, WELL, print};
 use crate::convert::ConvertOptions;
 use crate::disney::DiffuseModel;
 use crate::imagefile;
@@ -91,6 +91,8 @@ pub(super) struct Arguments {
     /// The animation of a glTF file, by name; without it the first.
     #[arg(long, value_name = "NAME")]
     animation: Option<String>,
+    #[command(flatten)]
+    allowed: Allowed,
     /// The tone curve of a PNG: neutral, srgb or agx.
     #[arg(long, value_name = "CURVE", value_parser = parse_enum::<ToneCurve>, default_value = "neutral")]
     tone: ToneCurve,
@@ -137,6 +139,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         variant: arguments.variant.clone(),
         time: arguments.time,
         animation: arguments.animation.clone(),
+        reach: arguments.allowed.reach(),
     };
     let convert_options = ConvertOptions { diffuse: arguments.diffuse };
     let materials = arguments.materials.as_deref();

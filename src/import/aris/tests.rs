@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::color::Rgb;
+use crate::import::Reach;
 use crate::scene::Scene;
 use crate::scene::camera::{Aperture, FovAxis, Projection};
 use crate::scene::environment::{EnvironmentMap, Equirectangular};
@@ -349,7 +350,7 @@ fn odd_overrides_never_panic() {
         let begin = ["", "spp=", "+x.y=", "scene.brdf.0.config.color=", "++scene.", "scene.camera.config="]
             [random(6)];
         let line = begin.to_owned() + &(0..length).map(|_| pieces[random(pieces.len())]).collect::<String>();
-        let Ok(config) = ArisConfig::compose(&folder.path().join("config"), &[line]) else { continue };
+        let Ok(config) = ArisConfig::compose(&folder.path().join("config"), &[line], Reach::Folder) else { continue };
         composed += 1;
         let _ = (config.import(), config.to_yaml(), config.provenance(), config.output_folder());
     }
@@ -361,7 +362,7 @@ fn the_names_of_output_folders_are_short_and_their_own() {
     let folder = folder(&[("config/render.yaml", b"spp: 1\nx: {y: 1}\n")]);
     let name = |overrides: &[&str]| {
         let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
-        let config = ArisConfig::compose(&folder.path().join("config"), &overrides).unwrap();
+        let config = ArisConfig::compose(&folder.path().join("config"), &overrides, Reach::Folder).unwrap();
         config.output_folder().to_str().unwrap().to_owned()
     };
     assert_eq!(name(&[]), "outputs/default");

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use super::polygon::MAX_CORNERS;
 use super::{Grouping, ObjError};
 use crate::record::Warning;
 
@@ -337,6 +338,9 @@ impl Faces<'_> {
             let _ =
                 write!(faces, " {}/{}/{}", corner.position + 1, shifted(corner.uv), shifted(corner.normal));
             corners += 1;
+            if corners > MAX_CORNERS {
+                return Err(ObjError::PolygonTooLarge { place: format!("{}:{line}", self.name), corners });
+            }
         }
         faces.push('\n');
         if corners < 3 || bad {
