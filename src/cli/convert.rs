@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::conversion::Conversion;
-use super::{FAILED, Outcome, Talk, WELL, print, tell};
+use super::{Allowed, FAILED, Outcome, Talk, WELL, print, tell};
 use crate::convert::ConvertOptions;
 use crate::export::{self, Exported, Input, Target, export};
 use crate::import::ImportOptions;
@@ -31,6 +31,8 @@ pub(super) struct Arguments {
     /// root with meshes, of constants alone.
     #[arg(long, value_name = "TARGET", value_parser = parse_target, default_value = "library")]
     to: Target,
+    #[command(flatten)]
+    allowed: Allowed,
     /// How to tell what became of the materials, on stdout.
     #[arg(long, value_enum, default_value_t = Report::Table)]
     report: Report,
@@ -54,8 +56,9 @@ fn parse_target(text: &str) -> Result<Target, String> {
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let inputs = export::inputs(&arguments.scenes, &output(arguments))?;
-    let options = arguments.conversion.options();
-    let (exported, failed) = convert_all(&inputs, arguments.to, &options, talk);
+    let import_options = ImportOptions { reach: arguments.allowed.reach(), ..ImportOptions::default() };
+    let options = (&import_options, &arguments.conversion.options());
+    let (exported, failed) = convert_all(&inputs, arguments.to, options, talk);
     for warning in exported.iter().flat_map(|e| &e.warnings) {
         talk.say(&format!("warning: {warning}"));
     }
@@ -81,7 +84,7 @@ type Failures = Vec<(PathBuf, export::ExportError)>;
 fn convert_all(
     inputs: &[Input],
     target: Target,
-    options: &ConvertOptions,
+    (import_options, convert_options): (&ImportOptions, &ConvertOptions),
     talk: Talk,
 ) -> (Vec<Exported>, Failures) {
     let bar = match (talk, inputs.len()) {
@@ -95,7 +98,7 @@ fn convert_all(
         .par_iter()
         .map(|input| {
             bar.set_message(input.source.display().to_string());
-            let result = export(&input.source, &input.folder, target, &ImportOptions::default(), options);
+            let result = export(&input.source, &input.folder, target, import_options, convert_options);
             bar.inc(1);
             result.map_err(|error| (input.source.clone(), error))
         })

@@ -1,16 +1,20 @@
 //! `pipeline inspect`.
 
+use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::progress::Progress;
 use super::render::parse_enum;
-use super::{FAILED, Outcome, Talk, WELL, print, print_bytes, tell};
+use super::{Allowed, FAILED, Outcome, Talk, WELL, print, print_bytes, tell};
 use crate::disney::{DiffuseModel, Masking};
 use crate::inspect::eval::{Variant, evaluate};
 use crate::inspect::{Edit, InspectError, MOST, Options, Target, gather, look, numbers, write_report};
 use crate::render::Control;
+
+/// The most rows that are evaluated at once, in bytes: some 700,000.
+const MAX_ROWS: u64 = 128 << 20;
 
 /// Look into materials: a page with a lit sphere, their lobes, albedo and sampling; or BRDF values for rows of a CSV file.
 ///
@@ -40,6 +44,8 @@ pub(super) struct Arguments {
     /// The diffuse term: burley, lambert or lambert_fresnel; the material's own where absent.
     #[arg(long, value_name = "MODEL", value_parser = parse_enum::<DiffuseModel>)]
     diffuse: Option<DiffuseModel>,
+    #[command(flatten)]
+    allowed: Allowed,
     /// Samples a pixel of the sphere.
     #[arg(long, value_name = "N", default_value_t = Options::default().spp, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     spp: u32,
@@ -61,7 +67,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
 fn inspect(arguments: &Arguments, talk: Talk) -> Result<u8, InspectError> {
     let targets: Vec<Target> = arguments.targets.iter().map(|text| Target::parse(text)).collect();
     let edits: Vec<Edit> = arguments.params.iter().map(|text| Edit::parse(text)).collect::<Result<_, _>>()?;
-    let gathered = gather(&targets, &edits, arguments.g, arguments.diffuse)?;
+    let gathered = gather(&targets, &edits, arguments.allowed.reach(), arguments.g, arguments.diffuse)?;
     for warning in &gathered.warnings {
         talk.say(&format!("warning: {warning}"));
     }
@@ -113,12 +119,19 @@ fn evaluate_rows(arguments: &Arguments, file: &Path, talk: Talk) -> Outcome {
 
 /// The content of a file, or of stdin for `-`, and what messages call it.
 fn read(file: &Path) -> Result<(Vec<u8>, String), String> {
-    if file == Path::new("-") {
-        let mut bytes = Vec::new();
-        std::io::stdin().lock().read_to_end(&mut bytes).map_err(|cause| format!("stdin: {cause}"))?;
-        return Ok((bytes, "stdin".to_owned()));
+    let is_stdin = file == Path::new("-");
+    let name = if is_stdin { "stdin".to_owned() } else { file.display().to_string() };
+    let mut bytes = Vec::new();
+    let read = if is_stdin {
+        std::io::stdin().lock().take(MAX_ROWS + 1).read_to_end(&mut bytes)
+    } else {
+        File::open(file).and_then(|file| file.take(MAX_ROWS + 1).read_to_end(&mut bytes))
+    };
+    match read {
+        Err(cause) => Err(format!("{name}: {cause}")),
+        Ok(size) if size as u64 > MAX_ROWS => {
+            Err(format!("{name}: at most {MAX_ROWS} bytes of rows are read at once"))
+        }
+        Ok(_) => Ok((bytes, name)),
     }
-    let name = file.display().to_string();
-    let bytes = std::fs::read(file).map_err(|cause| format!("{name}: {cause}"))?;
-    Ok((bytes, name))
 }

@@ -18,6 +18,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::import::Reach;
 use crate::sweep::SweepError;
 
 /// Everything is well.
@@ -104,6 +105,20 @@ fn run(arguments: &Arguments) -> Outcome {
         Command::Inspect(command) => inspect::run(command, talk),
         Command::Schema(command) => schema::run(command),
         Command::Completions(command) => completions::run(command),
+    }
+}
+
+/// How far the names of files in a scene lead, for every command that reads scenes.
+#[derive(Debug, clap::Args)]
+struct Allowed {
+    /// Let scenes and material libraries name files outside their own folder, as in ../textures/oak.png or by a link.
+    #[arg(long)]
+    allow_outside: bool,
+}
+
+impl Allowed {
+    fn reach(&self) -> Reach {
+        if self.allow_outside { Reach::Anywhere } else { Reach::Folder }
     }
 }
 

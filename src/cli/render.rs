@@ -9,7 +9,7 @@ use std::time::Instant;
 use self::config_root::{Outputs, Shown};
 use super::conversion::Conversion;
 use super::progress::Progress;
-use super::{Outcome, Talk, WELL, print};
+use super::{Allowed, Outcome, Talk, WELL, print};
 use crate::imagefile;
 use crate::import::{ArisConfig, ImportOptions, LightUnits};
 use crate::job::{self, Build, JobError, LoadedRun, LoadedScene, PlannedJob};
@@ -89,6 +89,8 @@ pub(super) struct Arguments {
     /// The animation of a glTF file, by name; without it the first.
     #[arg(long, value_name = "NAME")]
     animation: Option<String>,
+    #[command(flatten)]
+    allowed: Allowed,
     /// The tone curve of a PNG: neutral, srgb or agx.
     #[arg(long, value_name = "CURVE", value_parser = parse_enum::<ToneCurve>, default_value = "neutral")]
     tone: ToneCurve,
@@ -135,6 +137,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         variant: arguments.variant.clone(),
         time: arguments.time,
         animation: arguments.animation.clone(),
+        reach: arguments.allowed.reach(),
     };
     let convert_options = arguments.conversion.options();
     let materials = arguments.materials.as_deref();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::progress::Progress;
-use super::{DIFFERENT, FAILED, Outcome, Talk, WELL, print};
+use super::{Allowed, DIFFERENT, FAILED, Outcome, Talk, WELL, print};
 use crate::record::{Job, JobRecord, Outcome as JobOutcome, Verdict};
 use crate::render::Control;
 use crate::report::{TableOptions, verdict_table};
@@ -36,6 +36,8 @@ pub(super) struct Arguments {
     /// Stop after the first job that fails.
     #[arg(long)]
     fail_fast: bool,
+    #[command(flatten)]
+    allowed: Allowed,
     /// Only part I of N of the jobs; all machines split them alike.
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     shard: Option<Shard>,
@@ -53,7 +55,10 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
 }
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
-    let sweep = sweep::open(&arguments.manifest)?;
+    let mut sweep = sweep::open(&arguments.manifest)?;
+    if arguments.allowed.allow_outside {
+        sweep.reach = arguments.allowed.reach();
+    }
     let wanted = arguments.shard.map(|shard| shard.names(&sweep.jobs));
     let is_wanted = |job: &&Job| wanted.as_ref().is_none_or(|names| names.contains(job.name.as_str()));
     if arguments.list {

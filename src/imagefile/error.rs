@@ -15,6 +15,12 @@ pub enum ImageFileError {
         /// The system's reason.
         cause: std::io::Error,
     },
+    /// It is a folder, a device or a pipe.
+    #[error("{} is not a file with content of its own", path.display())]
+    NotAFile {
+        /// What it is the path of.
+        path: PathBuf,
+    },
     /// The file is larger than any that is read.
     #[error("{} is too large: at most {MAX_FILE} bytes are read", path.display())]
     FileTooLarge {
@@ -52,6 +58,26 @@ pub enum ImageFileError {
         height: u64,
         /// Channels, over all parts.
         channels: u64,
+    },
+    /// It declares more than so few bytes can hold.
+    #[error("{name} is damaged: it declares {declared} bytes of pixels, more than its {size} bytes can hold")]
+    TooSmall {
+        /// The image.
+        name: String,
+        /// The bytes that its pixels would take.
+        declared: u64,
+        /// Its size in bytes.
+        size: usize,
+    },
+    /// It takes too much together with the other images of its scene.
+    #[error(
+        "with {name} the scene's images take more than {limit} bytes, which is more than files of their size hold"
+    )]
+    TooMuchTogether {
+        /// The image.
+        name: String,
+        /// What they may take.
+        limit: u64,
     },
     /// It is damaged: truncated, contradictory or not what it says.
     #[error("{name} is damaged: {why}")]

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::raster::{Attribute, SampleType, Window};
 
-use super::{ImageFileError, MAX_VALUES};
+use super::{ImageFileError, MAX_VALUES, check_declared};
 
 /// Bits of the version field.
 const LONG_NAMES: u32 = 0x400;
@@ -175,6 +175,8 @@ pub(super) fn scan(bytes: &[u8], name: &str) -> Result<Vec<PartHead>, ImageFileE
         }
         parts.push(part);
     }
+    // A raster holds floats, whatever the file does.
+    check_declared(values * 4, bytes.len(), name)?;
     Ok(parts)
 }
 

@@ -6,7 +6,7 @@ use std::io::Read;
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 
 use super::texture::{Decoded, Samples};
-use super::{ImageFileError, MAX_VALUES};
+use super::{ImageFileError, MAX_VALUES, check_declared};
 
 /// The first bytes of a KTX2 file.
 pub(super) const MAGIC: &[u8] = &[0xab, b'K', b'T', b'X', b' ', b'2', b'0', 0xbb, b'\r', b'\n', 0x1a, b'\n'];
@@ -65,6 +65,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Decoded, ImageFileError
     if width == 0 || height == 0 {
         return Err(damaged("it has no pixels"));
     }
+    check_declared(width * height * 4, bytes.len(), name)?;
     if let Some(channels) = header.plain_channels() {
         let values =
             plain(bytes, &header, channels).ok_or_else(|| damaged("its pixels are not all there"))?;

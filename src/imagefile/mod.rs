@@ -35,6 +35,13 @@ use crate::raster::Raster;
 /// The most values (pixels times channels, over all parts) that a file may declare: 2^28, a gibibyte of floats.
 pub const MAX_VALUES: u64 = 1 << 28;
 
+/// The bytes of pixels that any file may declare, however small it is.
+const FREE_BYTES: u64 = 64 << 20;
+
+/// The bytes of pixels that a file may declare for each of its own beyond that. Deflate, which PNG and EXR pack with, comes to at most
+/// 1032 (zlib's technical details); WebP alone could come to more, for large pictures of a single colour.
+const BYTES_PER_BYTE: u64 = 1100;
+
 /// The largest file that is read, in bytes: what [`MAX_VALUES`] take uncompressed, and as much again.
 pub const MAX_FILE: u64 = 1 << 31;
 
@@ -105,9 +112,24 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<Raster, ImageFileError> {
     }
 }
 
+/// Whether a file of `size` bytes can hold `declared` bytes of pixels.
+///
+/// # Errors
+/// If so few can't, so that nobody needs to find memory for what never comes.
+fn check_declared(declared: u64, size: usize, name: &str) -> Result<(), ImageFileError> {
+    if declared > FREE_BYTES.saturating_add(BYTES_PER_BYTE.saturating_mul(size as u64)) {
+        return Err(ImageFileError::TooSmall { name: name.into(), declared, size });
+    }
+    Ok(())
+}
+
 /// The bytes of a file of at most [`MAX_FILE`].
 fn read_bounded(path: &Path) -> Result<Vec<u8>, ImageFileError> {
     let fail = |cause| ImageFileError::Read { path: path.into(), cause };
+    // A device never ends.
+    if !path.metadata().map_err(fail)?.is_file() {
+        return Err(ImageFileError::NotAFile { path: path.into() });
+    }
     let file = File::open(path).map_err(fail)?;
     let mut bytes = Vec::new();
     file.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(fail)?;

@@ -13,7 +13,7 @@ use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageEr
 use crate::raster::{Channel, Layer, Raster, SampleType, Window};
 
 use super::texture::{Decoded, Samples};
-use super::{Format, ImageFileError, MAX_VALUES, ktx2, write_whole};
+use super::{Format, ImageFileError, MAX_VALUES, check_declared, ktx2, write_whole};
 
 /// Decodes a picture to a raster of one layer: channels `Y`, `Y A`, `R G B` or `R G B A`, integers as value / maximum, alpha
 /// associated.
@@ -44,10 +44,10 @@ fn decode_dynamic(bytes: &[u8], format: Format, name: &str) -> Result<DynamicIma
     let about = |error: ImageError| about(error, name);
     let input = Cursor::new(bytes);
     match format {
-        Format::Png => finish(PngDecoder::with_limits(input, limits()).map_err(about)?, name),
-        Format::Jpeg => finish(JpegDecoder::new(input).map_err(about)?, name),
-        Format::WebP => finish(WebPDecoder::new(input).map_err(about)?, name),
-        Format::Hdr => finish(HdrDecoder::new(input).map_err(about)?, name),
+        Format::Png => finish(PngDecoder::with_limits(input, limits()).map_err(about)?, bytes.len(), name),
+        Format::Jpeg => finish(JpegDecoder::new(input).map_err(about)?, bytes.len(), name),
+        Format::WebP => finish(WebPDecoder::new(input).map_err(about)?, bytes.len(), name),
+        Format::Hdr => finish(HdrDecoder::new(input).map_err(about)?, bytes.len(), name),
         Format::Exr | Format::Ktx2 => Err(damaged(name, "it came to the wrong decoder")),
     }
 }
@@ -59,8 +59,8 @@ fn limits() -> Limits {
     limits
 }
 
-/// Checks the declared size, then decodes.
-fn finish<D: ImageDecoder>(mut decoder: D, name: &str) -> Result<DynamicImage, ImageFileError> {
+/// Checks what a file of `size` bytes declares, then decodes.
+fn finish<D: ImageDecoder>(mut decoder: D, size: usize, name: &str) -> Result<DynamicImage, ImageFileError> {
     let (width, height) = decoder.dimensions();
     let channels = decoder.color_type().channel_count();
     if u64::from(width).saturating_mul(height.into()).saturating_mul(channels.into()) > MAX_VALUES {
@@ -74,6 +74,7 @@ fn finish<D: ImageDecoder>(mut decoder: D, name: &str) -> Result<DynamicImage, I
     if width == 0 || height == 0 {
         return Err(damaged(name, "it has no pixels"));
     }
+    check_declared(decoder.total_bytes(), size, name)?;
     decoder.set_limits(limits()).map_err(|error| about(error, name))?;
     DynamicImage::from_decoder(decoder).map_err(|error| about(error, name))
 }

@@ -19,9 +19,9 @@ use serde::Serialize;
 
 pub(crate) use aris::yaml;
 pub use aris::{ArisConfig, ArisError, ArisRun};
-pub use files::{FileDigest, FileError, Files};
+pub use files::{FileDigest, FileError, Files, Reach};
 pub use gltf::{GltfError, UriProblem};
-pub use images::{EnvironmentError, read_environment, read_image};
+pub use images::{EnvironmentError, Images, read_environment, read_image};
 pub use obj::ObjError;
 pub use validate::InvalidScene;
 
@@ -31,6 +31,11 @@ use crate::scene::source::SourceMaterial;
 
 /// The most that a packed file may unpack to, in bytes.
 const MAX_UNPACKED: u64 = 4 << 30;
+
+/// What a packed file may unpack to, however small it is, in bytes; and what for each of its own beyond that. Meshes come to 2 to 10, text that
+/// repeats itself to some 30.
+const FREE_UNPACKED: u64 = 4 << 20;
+const UNPACKED_PER_BYTE: u64 = 64;
 
 /// A scene as its file describes it.
 #[derive(Clone, Debug)]
@@ -58,6 +63,9 @@ pub struct ImportOptions {
     /// The animation that `time` is of, by name. None is the first; one without a time is shown at 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub animation: Option<String>,
+    /// How far the names of files in the scene lead. No part of a job's identity: what was read is.
+    #[serde(skip)]
+    pub reach: Reach,
 }
 
 /// The unit of glTF's punctual lights.
@@ -97,11 +105,13 @@ pub enum ImportError {
         /// The decoder's reason.
         cause: std::io::Error,
     },
-    /// A packed file that unpacks to more than any scene needs.
-    #[error("{} unpacks to more than {MAX_UNPACKED} bytes", path.display())]
+    /// A packed file that unpacks to more than any scene of its size.
+    #[error("{} unpacks to more than {limit} bytes, more than any scene packed so small", path.display())]
     UnpackedTooLarge {
         /// The file.
         path: PathBuf,
+        /// What it may unpack to.
+        limit: u64,
     },
     /// A glTF file that can't be imported.
     #[error("{}: {cause}", path.display())]
@@ -137,7 +147,7 @@ pub enum ImportError {
 /// out of range, or leaves nothing to render.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
     let (name, dialect) = name_and_dialect(path)?;
-    let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
+    let mut files = Files::new(path.parent().unwrap_or(Path::new("")), options.reach)?;
     let bytes = files.read(name)?;
     import_with(files, path, name, dialect, &bytes, options)
 }
@@ -149,7 +159,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
 /// As for [`import`].
 pub fn import_bytes(path: &Path, bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     let (name, dialect) = name_and_dialect(path)?;
-    let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
+    let mut files = Files::new(path.parent().unwrap_or(Path::new("")), options.reach)?;
     files.note(name, bytes);
     import_with(files, path, name, dialect, bytes, options)
 }
@@ -184,7 +194,10 @@ fn import_with(
 ) -> Result<Imported, ImportError> {
     let (_, packing) = Packing::of(name);
     let bytes = match packing {
-        Some(packing) => Cow::Owned(packing.unpack(bytes, path, MAX_UNPACKED)?),
+        Some(packing) => {
+            let limit = FREE_UNPACKED + UNPACKED_PER_BYTE.saturating_mul(bytes.len() as u64);
+            Cow::Owned(packing.unpack(bytes, path, limit.min(MAX_UNPACKED))?)
+        }
         None => Cow::Borrowed(bytes),
     };
     let mut digests = None;
@@ -194,7 +207,7 @@ fn import_with(
         Dialect::Obj => obj::import(&mut files, name, &bytes)?,
         Dialect::Aris => {
             // Its folder is the one that holds `config/`, above the scene's own, and so are its files.
-            let of_config = aris::import(path).map_err(Box::new)?;
+            let of_config = aris::import(path, options.reach).map_err(Box::new)?;
             digests = Some(of_config.files);
             (of_config.scene, of_config.warnings)
         }
@@ -265,7 +278,7 @@ impl Packing {
         }
         .map_err(failed)?;
         if bytes.len() as u64 > limit {
-            return Err(ImportError::UnpackedTooLarge { path: path.to_owned() });
+            return Err(ImportError::UnpackedTooLarge { path: path.to_owned(), limit });
         }
         Ok(bytes)
     }

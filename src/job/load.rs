@@ -69,7 +69,8 @@ pub fn load_configured(
     materials: Option<&Path>,
 ) -> Result<LoadedRun, JobError> {
     let ArisRun { imported, settings, save_exr } = import_configured(config)?;
-    let options = (&ImportOptions::default(), convert_options);
+    let import_options = ImportOptions { reach: config.reach(), ..ImportOptions::default() };
+    let options = (&import_options, convert_options);
     let loaded = loaded(imported, options, materials, |scene, warnings| {
         if settings.integrator.needs_light() && !studio::is_lit(scene) {
             let what =
@@ -112,7 +113,8 @@ fn loaded(
     warnings.extend(converted.warnings);
     let mut files = imported.files;
     if let Some(path) = materials {
-        let library = Library::read(path)?.ok_or_else(|| JobError::NoLibrary { path: path.into() })?;
+        let library = Library::read(path, import_options.reach)?
+            .ok_or_else(|| JobError::NoLibrary { path: path.into() })?;
         let (read, noticed) = library.lay_over(&mut scene)?;
         files.extend(read);
         warnings.extend(noticed);

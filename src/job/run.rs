@@ -94,7 +94,7 @@ pub fn plan(job: &Job, loaded: &LoadedScene, build: &Build) -> Result<PlannedJob
     let mut warnings: Vec<Warning> = Vec::new();
     check_environment(job, &scene)?;
     edit::apply_all(&mut scene, &mut settings, &job.overrides, &mut |path| {
-        let (image, digest, replaced) = read_environment(path)?;
+        let (image, digest, replaced) = read_environment(path, loaded.import_options.reach)?;
         images.push(digest);
         warnings.extend(replaced);
         Ok(image)

@@ -10,7 +10,7 @@ use super::{Library, LibraryError, field, keys};
 use crate::color::Rgb;
 use crate::disney::Parameter;
 use crate::import::yaml::{self, Node, Place};
-use crate::import::{FileDigest, Files, read_image};
+use crate::import::{FileDigest, Files, Images, read_image};
 use crate::manifest::edit::{MaterialField, set_material};
 use crate::manifest::nearest::nearest;
 use crate::record::{Value, Warning};
@@ -23,7 +23,8 @@ pub(super) fn lay_over(
     scene: &mut Scene<Material>,
 ) -> Result<(Vec<FileDigest>, Vec<Warning>), LibraryError> {
     let Library { entries, files } = library;
-    let mut overlay = Overlay { scene, files, images: BTreeMap::new(), warnings: Vec::new() };
+    let mut overlay =
+        Overlay { scene, files, images: BTreeMap::new(), decoder: Images::default(), warnings: Vec::new() };
     for entry in &entries {
         overlay.entry(entry)?;
     }
@@ -35,6 +36,7 @@ struct Overlay<'a> {
     files: Files,
     /// By file.
     images: BTreeMap<String, ImageId>,
+    decoder: Images,
     warnings: Vec<Warning>,
 }
 
@@ -221,7 +223,7 @@ impl Overlay<'_> {
         if let Some(&image) = self.images.get(file) {
             return Ok(image);
         }
-        let (image, warning) = read_image(&mut self.files, file)
+        let (image, warning) = read_image(&mut self.files, &mut self.decoder, file)
             .map_err(|cause| LibraryError::Image { place: node.place.to_string(), cause })?;
         self.warnings.extend(warning);
         let id = ImageId(self.scene.images.len() as u32);

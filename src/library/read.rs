@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::LibraryError;
 use crate::import::yaml::{self, Node, Place};
-use crate::import::{FileDigest, Files};
+use crate::import::{FileDigest, Files, Reach};
 use crate::record::Warning;
 use crate::scene::{Material, Named, Scene};
 
@@ -28,12 +28,13 @@ pub(super) struct Entry {
 }
 
 impl Library {
-    /// The library in the file `path`, or `None` if it is an Aris scene.
+    /// The library in the file `path`, or `None` if it is an Aris scene. Its textures lie in its folder, or elsewhere as far as
+    /// `reach` says.
     ///
     /// # Errors
     /// If it can't be read, isn't YAML, or hasn't a library's form.
-    pub fn read(path: &Path) -> Result<Option<Self>, LibraryError> {
-        let mut files = Files::new(path.parent().unwrap_or(Path::new("")))?;
+    pub fn read(path: &Path, reach: Reach) -> Result<Option<Self>, LibraryError> {
+        let mut files = Files::new(path.parent().unwrap_or(Path::new("")), reach)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let bytes = files.read(&name)?;
         let entries = entries(&path.display().to_string(), &bytes)?;

@@ -5,7 +5,7 @@ use super::*;
 use crate::color::Rgb;
 use crate::convert::{ConvertOptions, to_disney};
 use crate::disney::{Model, Parameter};
-use crate::import::{ImportOptions, import};
+use crate::import::{ImportOptions, Reach, import};
 use crate::scene::material::{Curve, Param, TextureChannel, TextureMap};
 use crate::scene::{AnisotropyMap, Material, Named, Scene, TextureId};
 
@@ -13,7 +13,7 @@ fn library(text: &str) -> Result<Scene<Material>, LibraryError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("metals.yaml");
     std::fs::write(&path, text).unwrap();
-    Library::read(&path)?.expect("a library").into_scene()
+    Library::read(&path, Reach::Folder)?.expect("a library").into_scene()
 }
 
 fn message(text: &str) -> (String, Option<String>) {
@@ -71,7 +71,7 @@ fn a_material_that_the_scene_lacks_is_told_with_the_nearest() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.yaml");
     std::fs::write(&path, "bal: {roughness: 0.1}").unwrap();
-    let error = Library::read(&path).unwrap().unwrap().lay_over(&mut scene).unwrap_err();
+    let error = Library::read(&path, Reach::Folder).unwrap().unwrap().lay_over(&mut scene).unwrap_err();
     assert!(error.to_string().ends_with("m.yaml:1:1: the scene has no material `bal`"), "{error}");
     assert!(error.hint().unwrap().contains("`ball`"));
 }
@@ -86,7 +86,7 @@ fn what_an_entry_does_not_say_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.yaml");
     std::fs::write(&path, "ball: {roughness: 0.125}").unwrap();
-    Library::read(&path).unwrap().unwrap().lay_over(&mut scene).unwrap();
+    Library::read(&path, Reach::Folder).unwrap().unwrap().lay_over(&mut scene).unwrap();
     *material.scalar_mut(Parameter::Roughness) = Param::Constant(0.125);
     assert_eq!(scene.materials[0].item, material);
 }
@@ -115,7 +115,7 @@ fn what_only_conversions_make_comes_back_too() {
     std::fs::write(&path, &written.text).unwrap();
     let mut laid_over = scene.clone();
     laid_over.materials[0].item = Material::default();
-    Library::read(&path).unwrap().unwrap().lay_over(&mut laid_over).unwrap();
+    Library::read(&path, Reach::default()).unwrap().unwrap().lay_over(&mut laid_over).unwrap();
     assert_eq!(flat(&scene, &scene.materials[0].item), flat(&laid_over, &laid_over.materials[0].item));
 }
 
@@ -133,7 +133,7 @@ fn written_libraries_come_back_to_the_same_materials() {
         let path = folder.path().join(FILE_NAME);
         std::fs::write(&path, &written.text).unwrap();
         let mut laid_over = scene.clone();
-        Library::read(&path).unwrap().unwrap().lay_over(&mut laid_over).unwrap();
+        Library::read(&path, Reach::Folder).unwrap().unwrap().lay_over(&mut laid_over).unwrap();
         for (before, after) in scene.materials.iter().zip(&laid_over.materials) {
             assert_eq!(flat(&scene, &before.item), flat(&laid_over, &after.item), "{file}: {}", before.name);
         }

@@ -257,6 +257,9 @@ pub enum Color {
 /// More errors than these are counted, not shown.
 const MOST_SHOWN: usize = 50;
 
+/// More text than this is not shown around an error, in bytes.
+const MOST_TEXT: usize = 64 << 10;
+
 impl ManifestErrors {
     pub(super) fn new(source: Source, mut diagnostics: Vec<Diagnostic>) -> Self {
         diagnostics.sort_by_key(|d| d.span.as_ref().map_or(0, |s| s.start));
@@ -294,23 +297,43 @@ impl ManifestErrors {
 
     fn render_one(&self, renderer: &Renderer, path: &str, diagnostic: &Diagnostic) -> String {
         let title = Level::ERROR.primary_title(one_line(&diagnostic.error.to_string()));
-        let mut group = match &diagnostic.span {
-            Some(span) => {
-                let mut snippet = Snippet::source(&*self.source.text)
-                    .path(path)
-                    .annotation(AnnotationKind::Primary.span(self.clamped(span)));
-                if let Some((span, word)) = &diagnostic.other {
-                    let other = AnnotationKind::Context.span(self.clamped(span)).label(*word);
-                    snippet = snippet.annotation(other);
+        let mut group = match (&diagnostic.span, self.position(diagnostic)) {
+            (Some(span), Some((line, column))) => {
+                let primary = self.clamped(span);
+                let other = diagnostic.other.as_ref().map(|(span, word)| (self.clamped(span), *word));
+                let lines = self.lines(&primary, other.as_ref().map(|(span, _)| span));
+                let inside = |span: Range<usize>| span.start - lines.start..span.end - lines.start;
+                if lines.len() > MOST_TEXT {
+                    let origin = Origin::path(path).line(line).char_column(column);
+                    title.element(origin)
+                } else {
+                    let first = self.source.text[..lines.start].matches('\n').count() + 1;
+                    let mut snippet = Snippet::source(&self.source.text[lines.clone()])
+                        .line_start(first)
+                        .path(path)
+                        .annotation(AnnotationKind::Primary.span(inside(primary)));
+                    if let Some((span, word)) = other {
+                        let other = AnnotationKind::Context.span(inside(span)).label(word);
+                        snippet = snippet.annotation(other);
+                    }
+                    title.element(snippet)
                 }
-                title.element(snippet)
             }
-            None => Group::with_title(title).element(Origin::path(path)),
+            _ => Group::with_title(title).element(Origin::path(path)),
         };
         if let Some(hint) = diagnostic.error.hint() {
             group = group.element(Level::HELP.message(one_line(&hint)));
         }
         renderer.render(&[group])
+    }
+
+    /// The whole lines from one of two spans to the other: what is shown, without going through all of the text for each error.
+    fn lines(&self, one: &Range<usize>, other: Option<&Range<usize>>) -> Range<usize> {
+        let text = &self.source.text;
+        let other = other.unwrap_or(one);
+        let (start, end) = (one.start.min(other.start), one.end.max(other.end));
+        let start = text[..start].rfind('\n').map_or(0, |at| at + 1);
+        start..text[end..].find('\n').map_or(text.len(), |n| end + n)
     }
 
     /// The part of a span's first line, on the borders of characters.

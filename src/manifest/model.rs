@@ -64,6 +64,9 @@ pub struct Manifest {
     /// A material library, relative to the manifest, to lay over the materials of every scene.
     #[schemars(with = "Option<String>")]
     pub materials: Option<PathBuf>,
+    /// Whether the scenes and the library may name files outside their own folders.
+    #[schemars(default)]
+    pub allow_outside: bool,
     /// What is set in every job, by path, as in `"material.ball.metallic" = 1.0`.
     #[schemars(with = "Option<BTreeMap<String, SettingTree>>")]
     pub set: Vec<Setting>,

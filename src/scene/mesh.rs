@@ -20,3 +20,16 @@ pub struct Mesh {
     /// Vertex indices, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
 }
+
+impl Mesh {
+    /// The memory that its values take, in bytes.
+    pub fn bytes(&self) -> usize {
+        let uvs: usize = self.uvs.iter().map(Vec::len).sum();
+        size_of_val(self.positions.as_slice())
+            + size_of_val(self.normals.as_slice())
+            + size_of_val(self.tangents.as_slice())
+            + uvs * size_of::<Vec2>()
+            + size_of_val(self.colors.as_slice())
+            + size_of_val(self.triangles.as_slice())
+    }
+}

@@ -19,6 +19,17 @@ pub struct Image {
     pub pixels: Pixels,
 }
 
+impl Image {
+    /// The memory that its values take, in bytes.
+    pub fn bytes(&self) -> u64 {
+        match &self.pixels {
+            Pixels::U8(values) => size_of_val(values.as_slice()) as u64,
+            Pixels::U16(values) => size_of_val(values.as_slice()) as u64,
+            Pixels::F32(values) => size_of_val(values.as_slice()) as u64,
+        }
+    }
+}
+
 /// The values of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pixels {

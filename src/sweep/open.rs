@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::SweepError;
+use crate::import::Reach;
 use crate::manifest::{Manifest, expand};
 use crate::record::Job;
 
@@ -15,6 +16,8 @@ pub struct Sweep {
     pub jobs: Vec<Job>,
     /// Where the results go, unless another folder is asked for.
     pub folder: PathBuf,
+    /// How far the scenes' names of files lead: as the manifest says, unless more is allowed.
+    pub reach: Reach,
 }
 
 /// Reads a manifest, finds its scenes and expands its axes.
@@ -29,7 +32,8 @@ pub fn open(path: &Path) -> Result<Sweep, SweepError> {
         Some(folder) => manifest.folder().join(folder),
         None => Path::new("outputs").join(manifest.folder_name()),
     };
-    Ok(Sweep { manifest, jobs, folder })
+    let reach = if manifest.allow_outside { Reach::Anywhere } else { Reach::Folder };
+    Ok(Sweep { manifest, jobs, folder, reach })
 }
 
 /// The scene files that the manifest names, those of a pattern in alphabetical order.

@@ -174,6 +174,7 @@ fn run_job(
 struct Scenes {
     /// The library that is laid over each.
     materials: Option<PathBuf>,
+    options: ImportOptions,
     last: Option<(PathBuf, LoadedScene)>,
     failed: BTreeMap<PathBuf, String>,
 }
@@ -181,7 +182,8 @@ struct Scenes {
 impl Scenes {
     fn of(sweep: &Sweep) -> Self {
         let materials = sweep.manifest.materials.as_ref().map(|file| sweep.manifest.folder().join(file));
-        Self { materials, ..Self::default() }
+        let options = ImportOptions { reach: sweep.reach, ..ImportOptions::default() };
+        Self { materials, options, ..Self::default() }
     }
 
     fn get(&mut self, path: &Path) -> Result<&LoadedScene, String> {
@@ -192,7 +194,7 @@ impl Scenes {
             self.last = None;
             let materials = self.materials.as_deref();
             let load = |path| -> Result<LoadedScene, JobError> {
-                job::load(path, &ImportOptions::default(), &ConvertOptions::default(), materials)
+                job::load(path, &self.options, &ConvertOptions::default(), materials)
             };
             match load(path) {
                 Ok(loaded) => self.last = Some((path.to_owned(), loaded)),

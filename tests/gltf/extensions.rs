@@ -195,7 +195,8 @@ fn a_cube_map_surrounds_the_scene() {
                 json!({"bufferView": bin.view(png.get_ref()), "mimeType": "image/png"})
             });
             json["images"] = images.collect();
-            let mut light = json!({"intensity": 2.0, "rotation": [0.0, 0.70710678, 0.0, 0.70710678],
+            let half = std::f64::consts::FRAC_1_SQRT_2;
+            let mut light = json!({"intensity": 2.0, "rotation": [0.0, half, 0.0, half],
                 "irradianceCoefficients": [], "specularImageSize": 4, "specularImages": [[0, 1, 2, 3, 4, 5]]});
             edit(&mut light);
             json["extensions"]["EXT_lights_image_based"] = json!({"lights": [light]});

@@ -9,7 +9,7 @@ use super::yaml::{Node, Value};
 /// The longest chain of interpolations.
 const MAX_CHAIN: u32 = 16;
 /// The most that interpolations insert, in values and bytes of text: a few lines can ask for more than there is memory.
-const MAX_INSERTED: usize = 1 << 22;
+const MAX_INSERTED: usize = 1 << 20;
 
 /// The tree with every interpolation replaced by what it names; places stay those of the interpolations.
 pub(super) fn resolve(tree: &Node) -> Result<Node, ArisError> {

@@ -21,7 +21,7 @@ use std::path::Path;
 
 pub use root::{ArisConfig, ArisRun};
 
-use super::{FileError, Files, Imported, ObjError};
+use super::{FileError, Files, Imported, ObjError, Reach};
 use crate::imagefile::ImageFileError;
 
 /// Why an Aris scene cannot be read. Places are `file:line:column`.
@@ -172,11 +172,11 @@ pub enum ArisError {
     },
 }
 
-/// Reads the scene file at `path` with everything it names.
+/// Reads the scene file at `path` with everything it names within `reach`.
 ///
 /// # Errors
 /// If a file is missing or cannot be read, a key is unknown or missing, or a value is of the wrong kind or out of range.
-pub(super) fn import(path: &Path) -> Result<Imported, ArisError> {
+pub(super) fn import(path: &Path, reach: Reach) -> Result<Imported, ArisError> {
     let failed = |cause| ArisError::Scene { path: path.display().to_string(), cause };
     let absolute =
         path.canonicalize().map_err(|cause| failed(FileError::Read { path: path.into(), cause }))?;
@@ -184,7 +184,7 @@ pub(super) fn import(path: &Path) -> Result<Imported, ArisError> {
     let config =
         absolute.ancestors().skip(1).find(|folder| folder.file_name().is_some_and(|name| name == "config"));
     let root = config.and_then(Path::parent).unwrap_or(own_folder);
-    let mut files = Files::new(root).map_err(failed)?;
+    let mut files = Files::new(root, reach).map_err(failed)?;
     let name = absolute.strip_prefix(root).ok().and_then(Path::to_str).map(|name| name.replace('\\', "/"));
     let name = name.ok_or_else(|| {
         let cause = std::io::Error::new(std::io::ErrorKind::InvalidInput, "its name is not Unicode");

@@ -6,7 +6,7 @@ use super::compose::compose;
 use super::overrides::{Action, Override, parse};
 use super::yaml::{Node, Value};
 use super::{ArisError, edit, interpolate, scene, settings, write};
-use crate::import::{FileDigest, FileError, Files, Imported};
+use crate::import::{FileDigest, FileError, Files, Imported, Reach};
 use crate::settings::RenderSettings;
 
 /// The file that makes a folder a config root.
@@ -19,6 +19,7 @@ const RUN_FOLDER: &str = "hydra.run.dir";
 pub struct ArisConfig {
     /// The folder that holds the config root, from which meshes and images are found.
     folder: PathBuf,
+    reach: Reach,
     tree: Node,
     run_folder: Option<String>,
     name: String,
@@ -42,11 +43,12 @@ impl ArisConfig {
     }
 
     /// Composes the configuration of the config root `path` with `overrides` such as `scene=cbox`, `scene/brdf=cbox_diffuse`,
-    /// `spp=50`, `+scene.camera.config.aperture=0.3` or `~scene/environment`, as Hydra 1.3 does.
+    /// `spp=50`, `+scene.camera.config.aperture=0.3` or `~scene/environment`, as Hydra 1.3 does. Its files lie in the folder that
+    /// holds the config root, or elsewhere as far as `reach` says.
     ///
     /// # Errors
     /// If a file is missing or is not YAML, a defaults list can't be followed, or an override can't be read or names nothing.
-    pub fn compose(path: &Path, overrides: &[String]) -> Result<Self, ArisError> {
+    pub fn compose(path: &Path, overrides: &[String], reach: Reach) -> Result<Self, ArisError> {
         let failed = |cause| ArisError::Scene { path: path.display().to_string(), cause };
         let io = |cause| failed(FileError::Read { path: path.into(), cause });
         let root = path.canonicalize().map_err(io)?;
@@ -55,7 +57,7 @@ impl ArisConfig {
             let why = "its name is not Unicode, or it is the root of all files";
             return Err(io(std::io::Error::new(std::io::ErrorKind::InvalidInput, why)));
         };
-        let mut files = Files::new(folder).map_err(failed)?;
+        let mut files = Files::new(folder, reach).map_err(failed)?;
         let overrides = overrides.iter().map(|line| parse(line)).collect::<Result<Vec<_>, _>>()?;
         let (of_hydra, overrides): (Vec<_>, Vec<_>) =
             overrides.into_iter().partition(|o| o.key.split(['.', '/']).next() == Some("hydra"));
@@ -72,7 +74,7 @@ impl ArisConfig {
             edit::apply(&mut tree, o)?;
         }
         let lines: Vec<&str> = overrides.iter().map(|o| o.line.as_str()).collect();
-        Ok(Self { folder: folder.to_owned(), tree, run_folder, name: name_of(&lines) })
+        Ok(Self { folder: folder.to_owned(), reach, tree, run_folder, name: name_of(&lines) })
     }
 
     /// The configuration as YAML, interpolations as they stand.
@@ -96,6 +98,11 @@ impl ArisConfig {
         }
     }
 
+    /// How far the names in its files lead.
+    pub fn reach(&self) -> Reach {
+        self.reach
+    }
+
     /// A short name of the run: its overrides.
     pub fn name(&self) -> &str {
         &self.name
@@ -113,7 +120,7 @@ impl ArisConfig {
             return Err(ArisError::Missing { place, within: "the configuration".to_owned(), key: "scene" });
         };
         let mut warnings = Vec::new();
-        let mut files = Files::new(&self.folder)
+        let mut files = Files::new(&self.folder, self.reach)
             .map_err(|cause| ArisError::Scene { path: self.folder.display().to_string(), cause })?;
         let scene = scene::build(&mut files, of_scene, &mut warnings)?;
         let size = scene.cameras.first().and_then(|camera| camera.item.size);

@@ -9,8 +9,7 @@ use super::ArisError;
 use super::yaml::{Node, Table, nearest};
 use crate::color::Rgb;
 use crate::disney::Parameter;
-use crate::import::images::decode_image;
-use crate::import::{Files, obj};
+use crate::import::{Files, Images, obj};
 use crate::record::Warning;
 use crate::scene::camera::{Aperture, FovAxis, Lens, Projection};
 use crate::scene::environment::{EnvironmentMap, Equirectangular};
@@ -458,10 +457,8 @@ fn read_environment(
                 cause,
                 hint: String::new(),
             })?;
-            let (image, replaced) = decode_image(&bytes, name).map_err(|cause| ArisError::Image {
-                place: place.clone(),
-                key: key.to_owned(),
-                cause: Box::new(cause),
+            let (image, replaced) = Images::default().decode(&bytes, name).map_err(|cause| {
+                ArisError::Image { place: place.clone(), key: key.to_owned(), cause: Box::new(cause) }
             })?;
             if !matches!(image.pixels, Pixels::F32(_)) {
                 return Err(path.mismatch(key, "an image of floats, EXR or HDR"));

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::color::Rgb;
+use crate::import::Reach;
 use crate::scene::Scene;
 use crate::scene::camera::{Aperture, FovAxis, Projection};
 use crate::scene::environment::{EnvironmentMap, Equirectangular};
@@ -30,7 +31,7 @@ fn import_scene(text: &str, others: &[(&str, &[u8])]) -> Result<Imported, ArisEr
     let mut files = vec![("config/scene/s.yaml", text.as_bytes())];
     files.extend_from_slice(others);
     let folder = folder(&files);
-    import(&folder.path().join("config/scene/s.yaml"))
+    import(&folder.path().join("config/scene/s.yaml"), Reach::default())
 }
 
 fn error(text: &str, others: &[(&str, &[u8])]) -> String {
@@ -69,7 +70,7 @@ fn a_scene_keeps_its_camera_to_the_letter() {
 #[test]
 fn a_scene_outside_any_config_folder_is_its_own_root() {
     let folder = folder(&[("s.yaml", format!("{GEOMETRY}{BRDF}{CAMERA}").as_bytes())]);
-    assert!(import(&folder.path().join("s.yaml")).is_ok());
+    assert!(import(&folder.path().join("s.yaml"), Reach::default()).is_ok());
 }
 
 #[test]
@@ -279,7 +280,7 @@ fn damaged_scenes_never_panic() {
             }
         }
         std::fs::write(&path, &damaged).unwrap();
-        match import(&path) {
+        match import(&path, Reach::default()) {
             Ok(Imported { scene, .. }) => {
                 read += 1;
                 assert!(scene.cameras[0].item.world_from_camera.is_finite());
@@ -349,7 +350,9 @@ fn odd_overrides_never_panic() {
         let begin = ["", "spp=", "+x.y=", "scene.brdf.0.config.color=", "++scene.", "scene.camera.config="]
             [random(6)];
         let line = begin.to_owned() + &(0..length).map(|_| pieces[random(pieces.len())]).collect::<String>();
-        let Ok(config) = ArisConfig::compose(&folder.path().join("config"), &[line]) else { continue };
+        let Ok(config) = ArisConfig::compose(&folder.path().join("config"), &[line], Reach::Folder) else {
+            continue;
+        };
         composed += 1;
         let _ = (config.import(), config.to_yaml(), config.provenance(), config.output_folder());
     }
@@ -361,7 +364,7 @@ fn the_names_of_output_folders_are_short_and_their_own() {
     let folder = folder(&[("config/render.yaml", b"spp: 1\nx: {y: 1}\n")]);
     let name = |overrides: &[&str]| {
         let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
-        let config = ArisConfig::compose(&folder.path().join("config"), &overrides).unwrap();
+        let config = ArisConfig::compose(&folder.path().join("config"), &overrides, Reach::Folder).unwrap();
         config.output_folder().to_str().unwrap().to_owned()
     };
     assert_eq!(name(&[]), "outputs/default");
@@ -381,15 +384,16 @@ fn the_corpus_is_read_as_far_as_its_meshes_are_there() {
     };
     let scenes = PathBuf::from(corpus).join("aris/config/scene");
     for (name, meshes) in [("cbox", 6), ("cbox_diffuse", 6), ("bunny", 1)] {
-        let Imported { scene, warnings, .. } = import(&scenes.join(format!("{name}.yaml"))).unwrap();
+        let Imported { scene, warnings, .. } =
+            import(&scenes.join(format!("{name}.yaml")), Reach::default()).unwrap();
         assert_eq!((scene.instances.len(), scene.materials.len()), (meshes, meshes), "{name}");
         assert!(warnings.is_empty(), "{name}: {warnings:?}");
     }
-    let Imported { scene: cbox, .. } = import(&scenes.join("cbox.yaml")).unwrap();
+    let Imported { scene: cbox, .. } = import(&scenes.join("cbox.yaml"), Reach::default()).unwrap();
     assert_eq!(aris(&cbox, "sphere1").brdf, ArisBrdf::Mirror);
     assert_eq!(aris(&cbox, "light").radiance, Some(Rgb::grey(40.0)));
     for name in ["ajax", "ajax_simple", "veach", "lego"] {
-        let told = import(&scenes.join(format!("{name}.yaml"))).unwrap_err().to_string();
+        let told = import(&scenes.join(format!("{name}.yaml")), Reach::default()).unwrap_err().to_string();
         assert!(told.contains("geometry.config.paths[0]: cannot read"), "{name}: {told}");
     }
 }

@@ -10,10 +10,14 @@ use gltf::json::validation::Checked;
 use super::buffers::{Buffers, lookup};
 use super::error::GltfError;
 
-/// The most elements that may be read from a file, all accessors and every reading of them together.
-const MAX_ELEMENTS: u64 = 1 << 31;
-/// The most elements of an accessor that lies in no buffer: all zeros, apart from sparse values.
-const MAX_ZEROS: u64 = 1 << 24;
+/// The most elements that may be read from a file, all accessors and every reading of them together, however small it is; and how many more for each byte in buffers.
+/// Many primitives may share one large array of vertices.
+const FREE_ELEMENTS: u64 = 1 << 22;
+const ELEMENTS_PER_BYTE: u64 = 128;
+/// The most elements of an accessor that lies in no buffer (all zeros, apart from sparse values), however small the file is; and
+/// how many more for each byte in buffers. What such an accessor goes with, such as positions, has its bytes there, compressed perhaps.
+const FREE_ZEROS: u64 = 1 << 16;
+const ZEROS_PER_BYTE: u64 = 16;
 
 /// Reads a file's accessors.
 pub(super) struct Accessors<'a> {
@@ -112,11 +116,9 @@ impl<'a> Accessors<'a> {
                 let layout = self.layout(&name, view.value(), offset, count, component, size)?;
                 (0..layout.count).map(|i| decode(&layout, i)).collect()
             }
-            None if count > MAX_ZEROS => {
-                return Err(GltfError::TooMany {
-                    what: "elements in an accessor without a bufferView",
-                    limit: MAX_ZEROS,
-                });
+            None if count > self.max_zeros() => {
+                let what = "elements in an accessor without a bufferView";
+                return Err(GltfError::TooMany { what, limit: self.max_zeros() });
             }
             None => vec![zero; count as usize],
         };
@@ -205,11 +207,17 @@ impl<'a> Accessors<'a> {
         Ok(Layout { bytes, stride, component, count: count as usize })
     }
 
+    /// The most elements of an accessor that lies in no buffer.
+    fn max_zeros(&self) -> u64 {
+        FREE_ZEROS.saturating_add(ZEROS_PER_BYTE.saturating_mul(self.buffers.stored()))
+    }
+
     /// Counts what is read: a small file may ask for the same elements again and again.
     fn charge(&self, elements: u64) -> Result<(), GltfError> {
         self.read.set(self.read.get().saturating_add(elements));
-        if self.read.get() > MAX_ELEMENTS {
-            return Err(GltfError::TooMany { what: "elements of accessors", limit: MAX_ELEMENTS });
+        let limit = FREE_ELEMENTS.saturating_add(ELEMENTS_PER_BYTE.saturating_mul(self.buffers.stored()));
+        if self.read.get() > limit {
+            return Err(GltfError::TooMany { what: "elements of accessors", limit });
         }
         Ok(())
     }
@@ -267,8 +275,8 @@ fn unsigned(component: ComponentType, bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::Files;
     use crate::import::gltf::container;
+    use crate::import::{Files, Reach};
 
     /// Reads with an accessor `json` over `data`: view 0 is all of it, view 1 all of it with a stride of 8.
     fn with<R>(data: &[u8], json: &str, read: impl FnOnce(&Accessors) -> R) -> R {
@@ -280,7 +288,9 @@ mod tests {
             "accessors": [{json}]}}"#
         );
         let document = container::open(text.as_bytes()).unwrap();
-        let buffers = Buffers::load(&document, &mut Files::new(std::path::Path::new("")).unwrap()).unwrap();
+        let buffers =
+            Buffers::load(&document, &mut Files::new(std::path::Path::new(""), Reach::Folder).unwrap())
+                .unwrap();
         read(&Accessors::new(&document.root, &buffers))
     }
 
@@ -350,9 +360,9 @@ mod tests {
 
     #[test]
     fn reading_the_same_elements_again_and_again_ends() {
-        let json = format!(r#"{{"count": {MAX_ZEROS}, "componentType": 5121, "type": "SCALAR"}}"#);
+        let json = format!(r#"{{"count": {FREE_ZEROS}, "componentType": 5121, "type": "SCALAR"}}"#);
         with(&[0], &json, |accessors| {
-            accessors.read.set(MAX_ELEMENTS - MAX_ZEROS + 1);
+            accessors.read.set(FREE_ELEMENTS + ELEMENTS_PER_BYTE - FREE_ZEROS + 1);
             assert!(matches!(accessors.indices(0, "test"), Err(GltfError::TooMany { .. })));
         });
     }

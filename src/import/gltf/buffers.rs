@@ -23,12 +23,14 @@ pub(super) struct Buffers<'a> {
     contents: Vec<Cow<'a, [u8]>>,
     /// The bytes of all of them.
     total: u64,
+    /// Those of the files and strings that they were read from, each once.
+    stored: u64,
 }
 
 impl<'a> Buffers<'a> {
     /// Reads every buffer: the GLB's own chunk, data: URIs, and files, each once.
     pub(super) fn load(document: &Document<'a>, files: &mut Files) -> Result<Self, GltfError> {
-        let mut loaded = Self { buffers: Vec::new(), contents: Vec::new(), total: 0 };
+        let mut loaded = Self { buffers: Vec::new(), contents: Vec::new(), total: 0, stored: 0 };
         let mut by_name: BTreeMap<String, usize> = BTreeMap::new();
         for (i, buffer) in document.root.buffers.iter().enumerate() {
             let element = format!("buffers[{i}]");
@@ -70,7 +72,13 @@ impl<'a> Buffers<'a> {
             loaded.charge(available)?;
             loaded.buffers.push((content, buffer.byte_length.0 as usize));
         }
+        loaded.stored = loaded.contents.iter().map(|content| content.len() as u64).sum();
         Ok(loaded)
+    }
+
+    /// The bytes that buffers were read from, before anything was decompressed.
+    pub(super) fn stored(&self) -> u64 {
+        self.stored
     }
 
     fn push(&mut self, bytes: Cow<'a, [u8]>) -> usize {

@@ -37,6 +37,10 @@ pub(super) const EXTENSIONS: &[&str] = &[
 
 /// The most JSON that is parsed, in bytes; it takes many times its size in memory.
 const MAX_JSON: usize = 256 << 20;
+/// The most objects in it, however small it is, and the bytes for each further one. Parsed, an object takes some 700 bytes, even if it is `{"a":0}`;
+/// those of glTF are seldom shorter than 30.
+const FREE_OBJECTS: usize = 1 << 16;
+const BYTES_PER_OBJECT: usize = 20;
 const MAGIC: &[u8; 4] = b"glTF";
 const JSON_CHUNK: u32 = u32::from_le_bytes(*b"JSON");
 const BIN_CHUNK: u32 = u32::from_le_bytes(*b"BIN\0");
@@ -54,6 +58,12 @@ pub(super) fn open(bytes: &[u8]) -> Result<Document<'_>, GltfError> {
     let (json, blob) = if bytes.starts_with(MAGIC) { split_glb(bytes)? } else { (bytes, None) };
     if json.len() > MAX_JSON {
         return Err(GltfError::JsonSize { size: json.len(), limit: MAX_JSON });
+    }
+    // Braces in texts count too: they are rare.
+    let objects = json.iter().filter(|&&b| b == b'{').count();
+    let limit = FREE_OBJECTS + json.len() / BYTES_PER_OBJECT;
+    if objects > limit {
+        return Err(GltfError::TooMany { what: "objects in its JSON", limit: limit as u64 });
     }
     let mut value: Value = gltf::json::deserialize::from_slice(json)?;
     check_extensions(&value)?;

@@ -10,6 +10,9 @@ use super::error::GltfError;
 use super::geometry::{attribute, vectors};
 use crate::scene::Mesh;
 
+/// The most sets of joints and weights, four each, that a vertex may have.
+const MAX_SETS: u32 = 16;
+
 /// How the vertices of a mesh are moved where a node shows it.
 #[derive(Default)]
 pub(super) struct Deformation {
@@ -118,8 +121,9 @@ impl Deformation {
         let position = attribute(primitive, Semantic::Positions);
         let mut influences = Vec::new();
         let mut set = 0;
-        while let (Some(j), Some(w)) =
-            (attribute(primitive, Semantic::Joints(set)), attribute(primitive, Semantic::Weights(set)))
+        while set < MAX_SETS
+            && let (Some(j), Some(w)) =
+                (attribute(primitive, Semantic::Joints(set)), attribute(primitive, Semantic::Weights(set)))
         {
             let pair = (accessors.floats::<4>(j, element)?, accessors.floats::<4>(w, element)?);
             let vertices = position.map_or(0, |p| accessors.count(p));
@@ -131,6 +135,9 @@ impl Deformation {
             }
             influences.push(pair);
             set += 1;
+        }
+        if attribute(primitive, Semantic::Joints(MAX_SETS)).is_some() {
+            warn(format!("JOINTS_{MAX_SETS} and what follows are ignored: at most {MAX_SETS} sets are read"));
         }
         if influences.is_empty() {
             warn(

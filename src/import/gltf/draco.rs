@@ -16,6 +16,13 @@ use super::geometry::MAX_TRIANGLES;
 
 const EXTENSION: &str = "KHR_draco_mesh_compression";
 
+/// The points and faces that data may hold, however short it is; and how many for each of its bytes. A triangle takes one to two bits in earnest
+/// (Rossignac, "Edgebreaker", 1999).
+const FREE_ELEMENTS: u64 = 1 << 16;
+const ELEMENTS_PER_BYTE: u64 = 64;
+/// The bytes of a point's attributes: position, normal, tangent, colour and two coordinates as floats take 72.
+const BYTES_PER_POINT: u64 = 128;
+
 /// The extension's object in a primitive.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -66,7 +73,10 @@ fn damaged(element: &str) -> GltfError {
 
 /// The mesh in `bytes`; none if they are damaged or it is larger than any that is read.
 fn decode(bytes: &[u8]) -> Option<Mesh> {
-    let limits = DecodeLimits::default().with_max_points(MAX_TRIANGLES).with_max_faces(MAX_TRIANGLES);
+    let most = FREE_ELEMENTS.saturating_add(ELEMENTS_PER_BYTE.saturating_mul(bytes.len() as u64));
+    let most = most.min(MAX_TRIANGLES);
+    let limits = DecodeLimits::default().with_max_points(most).with_max_faces(most);
+    let limits = limits.with_max_decoded_bytes(most.saturating_mul(BYTES_PER_POINT));
     // The decoder is made for hostile input; should it still panic, it has no state beyond this call.
     catch_unwind(AssertUnwindSafe(|| {
         let mut mesh = Mesh::new();

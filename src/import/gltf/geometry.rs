@@ -17,6 +17,9 @@ use crate::scene::Mesh;
 /// The most triangles that all meshes of a file may have together.
 pub(super) const MAX_TRIANGLES: u64 = 1 << 27;
 
+/// The most sets of texture coordinates that a mesh may have: each takes memory for a few characters in the file.
+const MAX_UV_SETS: usize = 16;
+
 /// What becomes of the alpha of vertex colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum VertexAlpha {
@@ -138,7 +141,9 @@ impl<'a> Geometry<'a> {
             mesh.tangents = self.accessors.floats::<4>(index, element)?.into_iter().map(Vec4::from).collect();
             check("TANGENT", mesh.tangents.len())?;
         }
-        while let Some(index) = attribute(primitive, Semantic::TexCoords(mesh.uvs.len() as u32)) {
+        while mesh.uvs.len() < MAX_UV_SETS
+            && let Some(index) = attribute(primitive, Semantic::TexCoords(mesh.uvs.len() as u32))
+        {
             let set = self.accessors.floats::<2>(index, element)?;
             check(&format!("TEXCOORD_{}", mesh.uvs.len()), set.len())?;
             mesh.uvs.push(set.into_iter().map(Vec2::from).collect());
@@ -146,7 +151,9 @@ impl<'a> Geometry<'a> {
         for semantic in primitive.attributes.keys() {
             match semantic {
                 Checked::Valid(Semantic::TexCoords(n)) if *n as usize >= mesh.uvs.len() => {
-                    warn(format!("TEXCOORD_{n} is ignored: sets must be numbered from 0 without a gap"));
+                    warn(format!(
+                        "TEXCOORD_{n} is ignored: at most {MAX_UV_SETS} sets are read, numbered from 0 without a gap"
+                    ));
                 }
                 Checked::Valid(Semantic::Colors(n)) if *n > 0 => {
                     warn(format!("COLOR_{n} is ignored: glTF gives COLOR_0 alone a meaning"));

@@ -88,7 +88,7 @@ pub(super) fn read(root: &Root, textures: &mut Textures<'_>) -> Result<Option<Su
     let element = format!("{EXTENSION}.lights[{}]", reference.light);
     let invalid = |property, expected| GltfError::Invalid { element: element.clone(), property, expected };
     let rotation = DQuat::from_array(light.rotation);
-    if !((rotation.length() - 1.0).abs() < 1e-2) {
+    if (rotation.length() - 1.0).abs() > 1e-2 || !rotation.is_finite() {
         return Err(invalid("rotation", "a unit quaternion"));
     }
     if !(light.intensity.is_finite() && light.intensity >= 0.0) {
@@ -97,14 +97,14 @@ pub(super) fn read(root: &Root, textures: &mut Textures<'_>) -> Result<Option<Su
     let faces = light.specular_images.first().map_or(&[][..], Vec::as_slice);
     let faces: [usize; 6] =
         faces.try_into().map_err(|_| invalid("specularImages", "at least one level, of six images"))?;
-    let faces = faces.into_iter().map(|index| textures.decode(index, &element)).collect::<Result<_, _>>()?;
+    let faces = faces.into_iter().map(|index| textures.pixels(index, &element)).collect::<Result<_, _>>()?;
     let image = unfold(&Cube { faces }, rotation.normalize(), textures)?;
     Ok(Some(Surroundings { image, intensity: light.intensity }))
 }
 
 /// Faces towards +x, -x, +y, -y, +z and -z, each as it is seen from inside: the extension turns them about so.
 struct Cube {
-    faces: Vec<Image>,
+    faces: Vec<Arc<Image>>,
 }
 
 impl Cube {
@@ -139,7 +139,7 @@ fn unfold(cube: &Cube, rotation: DQuat, textures: &mut Textures<'_>) -> Result<I
     let largest = cube.faces.iter().map(|face| face.width.max(face.height)).max().unwrap_or(1);
     let width = largest.saturating_mul(4).min(MAX_WIDTH);
     let height = width / 2;
-    textures.count_decoded(u64::from(width) * u64::from(height) * 12)?;
+    textures.count_decoded(u64::from(width) * u64::from(height) * 12, "the environment")?;
     let cube_from_world = rotation.inverse();
     let mut pixels = Vec::with_capacity(width as usize * height as usize * 3);
     for y in 0..height {
@@ -159,9 +159,9 @@ mod tests {
     use super::*;
 
     /// A face of 2 × 2 texels with a colour each: top left, top right, bottom left, bottom right.
-    fn face(texels: [[u8; 3]; 4]) -> Image {
+    fn face(texels: [[u8; 3]; 4]) -> Arc<Image> {
         let pixels = Pixels::U8(texels.concat());
-        Image { name: "face".into(), width: 2, height: 2, channels: 3, pixels }
+        Arc::new(Image { name: "face".into(), width: 2, height: 2, channels: 3, pixels })
     }
 
     #[test]
@@ -190,7 +190,7 @@ mod tests {
     fn alpha_divides() {
         let pixels = Pixels::U8(vec![255, 255, 255, 51]);
         let bright = Image { name: "face".into(), width: 1, height: 1, channels: 4, pixels };
-        let cube = Cube { faces: vec![bright; 6] };
+        let cube = Cube { faces: std::iter::repeat_n(Arc::new(bright), 6).collect() };
         assert!((cube.radiance(DVec3::new(0.3, 0.2, -1.0)).r - 5.0).abs() < 1e-4);
     }
 }

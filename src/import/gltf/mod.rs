@@ -51,6 +51,11 @@ use crate::scene::{Instance, MaterialId, Mesh, MeshId, Named, Scene};
 /// The most instances that a scene may have.
 const MAX_INSTANCES: u64 = 1 << 22;
 
+/// The memory that meshes and instances may take together, however small the file is, in bytes; and what for each byte of the file and its buffers.
+/// A few lines can show one array of vertices, or one mesh, again and again.
+const FREE_MEMORY: u64 = 32 << 20;
+const MEMORY_PER_BYTE: u64 = 64;
+
 /// The scene in `bytes`, the content of the file called `name`, with what was noticed.
 pub(super) fn import(
     files: &mut Files,
@@ -85,8 +90,11 @@ pub(super) fn import(
     for placed in &placed {
         worlds[placed.index] = Some(placed.world_from_node);
     }
+    let size = (bytes.len() as u64).saturating_add(buffers.stored());
+    let memory = FREE_MEMORY.saturating_add(MEMORY_PER_BYTE.saturating_mul(size));
     let mut stage = Stage {
         root,
+        memory: Memory { limit: memory, left: memory },
         pose,
         worlds,
         file: name,
@@ -140,9 +148,28 @@ fn read_materials(
 /// The meshes and materials of a mesh's primitives.
 type Parts = Vec<(MeshId, MaterialId)>;
 
+/// What meshes and instances may take, in bytes.
+struct Memory {
+    limit: u64,
+    left: u64,
+}
+
+impl Memory {
+    /// Takes `bytes` of what is left.
+    fn take(&mut self, bytes: usize) -> Result<(), GltfError> {
+        let left = self.left.checked_sub(bytes as u64);
+        self.left = left.ok_or(GltfError::TooMany {
+            what: "bytes for meshes and instances, more than any file of its size",
+            limit: self.limit,
+        })?;
+        Ok(())
+    }
+}
+
 /// The scene as it is put together.
 struct Stage<'a> {
     root: &'a Root,
+    memory: Memory,
     file: &'a str,
     geometry: Geometry<'a>,
     variant: Variant,
@@ -197,7 +224,9 @@ impl Stage<'_> {
         } else {
             self.read_mesh(index, deformer, &deformation, element)?
         };
-        self.check_instances(world.len().saturating_mul(parts.len()))?;
+        let count = world.len().saturating_mul(parts.len());
+        self.check_instances(count)?;
+        self.memory.take(count.saturating_mul(size_of::<Instance>() + placed.name().len()))?;
         for world_from_object in world {
             for &(mesh, material) in &parts {
                 let name = placed.name();
@@ -285,6 +314,7 @@ impl Stage<'_> {
             let part = Part { primitive, element: &element, name, alpha, tangents, deformation };
             let mesh = self.geometry.read(part, &mut self.warnings)?;
             if let Some(mesh) = mesh {
+                self.memory.take(mesh.bytes())?;
                 let id = MeshId(self.scene.meshes.len() as u32);
                 self.scene.meshes.push(mesh);
                 parts.push((id, material));

@@ -135,7 +135,7 @@ impl Baker {
         });
         let Some(lie) = largest.cloned() else { return Ok(None) };
         let (width, height) = size(&lie);
-        reader.textures.count_decoded(u64::from(width) * u64::from(height) * 7)?;
+        reader.textures.count_decoded(u64::from(width) * u64::from(height) * 7, "a pair of images")?;
         let (mut colors, mut rest) = (Vec::new(), Vec::new());
         let code = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
         for y in 0..height {

@@ -14,16 +14,12 @@ use serde::Deserialize;
 use super::buffers::{Buffers, lookup, read_file, resolve};
 use super::error::GltfError;
 use super::uri::Target;
-use crate::import::Files;
-use crate::import::images::decode_image;
+use crate::import::{Files, Images};
 use crate::math::Real;
 use crate::record::Warning;
 use crate::scene::material::{TextureChannel, TextureMap};
-use crate::scene::texture::{Encoding, Pixels, Texel, TexelFilter, Wrap};
+use crate::scene::texture::{Encoding, Texel, TexelFilter, Wrap};
 use crate::scene::{Image, ImageId, Texture, TextureId};
-
-/// The most bytes that all decoded images of a file may take together.
-const MAX_DECODED: u64 = 8 << 30;
 
 /// What all texture slots of a material have in common.
 pub(super) struct Slot {
@@ -65,8 +61,10 @@ pub(super) struct Textures<'a> {
     textures: Vec<Texture>,
     images: Vec<Arc<Image>>,
     by_source: BTreeMap<usize, ImageId>,
+    by_file: BTreeMap<String, ImageId>,
+    by_view: BTreeMap<usize, ImageId>,
     by_use: BTreeMap<(usize, bool), TextureId>,
-    decoded: u64,
+    decoder: Images,
     warnings: Vec<Warning>,
 }
 
@@ -80,8 +78,10 @@ impl<'a> Textures<'a> {
             textures: Vec::new(),
             images: Vec::new(),
             by_source: BTreeMap::new(),
+            by_file: BTreeMap::new(),
+            by_view: BTreeMap::new(),
             by_use: BTreeMap::new(),
-            decoded: 0,
+            decoder: Images::default(),
             warnings: Vec::new(),
         }
     }
@@ -135,13 +135,9 @@ impl<'a> Textures<'a> {
         id
     }
 
-    /// Counts what images take before more is made of them.
-    pub(super) fn count_decoded(&mut self, bytes: u64) -> Result<(), GltfError> {
-        self.decoded = self.decoded.saturating_add(bytes);
-        if self.decoded > MAX_DECODED {
-            return Err(GltfError::TooMany { what: "bytes of decoded images", limit: MAX_DECODED });
-        }
-        Ok(())
+    /// Counts what the image called `name` will take, before it is made of others.
+    pub(super) fn count_decoded(&mut self, bytes: u64, name: &str) -> Result<(), GltfError> {
+        Ok(self.decoder.count(bytes, name)?)
     }
 
     fn texture(&mut self, index: usize, encoding: Encoding, element: &str) -> Result<TextureId, GltfError> {
@@ -185,36 +181,47 @@ impl<'a> Textures<'a> {
         if let Some(&id) = self.by_source.get(&index) {
             return Ok(id);
         }
-        let image = self.decode(index, element)?;
-        let id = ImageId(self.images.len() as u32);
-        self.images.push(Arc::new(image));
+        let id = self.read_image(index, element)?;
         self.by_source.insert(index, id);
         Ok(id)
     }
 
-    /// `images[index]`, of which `element` speaks, for a use of its own.
-    pub(super) fn decode(&mut self, index: usize, element: &str) -> Result<Image, GltfError> {
+    /// The content of `images[index]`, of which `element` speaks.
+    pub(super) fn pixels(&mut self, index: usize, element: &str) -> Result<Arc<Image>, GltfError> {
+        let id = self.image(index, element)?;
+        Ok(self.images[id.0 as usize].clone())
+    }
+
+    /// `images[index]`, which `element` refers to. What two of them have in common, a file or a bufferView, is decoded once.
+    fn read_image(&mut self, index: usize, element: &str) -> Result<ImageId, GltfError> {
         let json = lookup(&self.root.images, index, element, "images")?;
         let element = format!("images[{index}]");
         let name = |fallback: &str| json.name.clone().unwrap_or_else(|| fallback.to_owned());
+        let id = ImageId(self.images.len() as u32);
         let (image, replaced) = match (&json.uri, json.buffer_view) {
             (_, Some(view)) => {
+                let known = *self.by_view.entry(view.value()).or_insert(id);
+                if known != id {
+                    return Ok(known);
+                }
                 let (bytes, _) = self.buffers.view(self.root, view.value(), &element)?;
-                decode_image(bytes, &name(&element))?
+                self.decoder.decode(bytes, &name(&element))?
             }
             (Some(uri), None) => match resolve(uri, &element)? {
-                Target::Data(bytes) => decode_image(&bytes, &name(&element))?,
-                Target::File(file) => decode_image(&read_file(self.files, &file, &element)?, &file)?,
+                Target::Data(bytes) => self.decoder.decode(&bytes, &name(&element))?,
+                Target::File(file) => {
+                    let known = *self.by_file.entry(file.clone()).or_insert(id);
+                    if known != id {
+                        return Ok(known);
+                    }
+                    self.decoder.decode(&read_file(self.files, &file, &element)?, &file)?
+                }
             },
             (None, None) => return Err(GltfError::Missing { element, property: "uri or bufferView" }),
         };
         self.warnings.extend(replaced);
-        self.count_decoded(match &image.pixels {
-            Pixels::U8(v) => v.len() as u64,
-            Pixels::U16(v) => v.len() as u64 * 2,
-            Pixels::F32(v) => v.len() as u64 * 4,
-        })?;
-        Ok(image)
+        self.images.push(Arc::new(image));
+        Ok(id)
     }
 }
 

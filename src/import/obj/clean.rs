@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 
 use glam::Vec3;
 
+use super::polygon::MAX_CORNERS;
 use super::smoothing::SmoothNormals;
 use super::{Grouping, ObjError};
 use crate::record::Warning;
@@ -344,6 +345,10 @@ impl Faces<'_> {
             let corner = Corner::parse(word, self.seen, self.vertices.counts)
                 .map_err(|flaw| flaw.at(self.name, line, word, self.vertices.counts))?;
             corners.push(corner);
+            if corners.len() > MAX_CORNERS {
+                let place = format!("{}:{line}", self.name);
+                return Err(ObjError::PolygonTooLarge { place, corners: corners.len() });
+            }
         }
         let is_bad = |corner: &Corner| self.vertices.bad.binary_search(&corner.position).is_ok();
         if corners.iter().any(is_bad) {

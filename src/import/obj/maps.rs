@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::heights;
-use crate::import::Files;
-use crate::import::images::decode_image;
+use crate::import::{Files, Images, Reach};
 use crate::record::Warning;
 use crate::scene::material::TextureChannel;
 use crate::scene::source::{MtlMap, MtlMaterial, MtlSlot};
@@ -21,20 +20,53 @@ pub(super) struct Found {
     pub elsewhere: bool,
 }
 
-/// Looks for what a file in `folder` (inside the scene's) calls `written`: quotes stripped, backslashes turned, case ignored
+/// Why nothing was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum NotFound {
+    /// There is no such file.
+    #[error("is not there")]
+    Missing,
+    /// The name leads where the scene's may not.
+    #[error("leads out of the scene's folder; hint: --allow-outside lets it")]
+    Outside,
+    /// Not the name of a file.
+    #[error("is a URL; only files are read, nothing is fetched")]
+    Url,
+}
+
+/// Looks for what a file in `folder` (below the scene's) calls `written`: quotes stripped, backslashes turned, case ignored
 /// where there is no exact match, and at last, for paths of another machine, by the file's name alone.
-pub(super) fn find(files: &Files, folder: &str, written: &str) -> Option<Found> {
+pub(super) fn find(files: &Files, folder: &str, written: &str) -> Result<Found, NotFound> {
     let slashed = written.trim().trim_matches(['"', '\'']).replace('\\', "/");
     let parts: Vec<&str> = slashed.split('/').filter(|part| !part.is_empty() && *part != ".").collect();
-    let last = *parts.last()?;
-    let inside = !slashed.starts_with('/') && !parts[0].ends_with(':');
-    let named = inside.then(|| collapse(folder, &parts)).flatten();
-    let named = named.and_then(|parts| exact_or_any_case(files, &parts));
+    let &last = parts.last().ok_or(NotFound::Missing)?;
+    let is_relative = !slashed.starts_with('/') && !parts[0].ends_with(':');
+    let inside = is_relative.then(|| collapse(folder, &parts)).flatten();
+    let named = match &inside {
+        Some(parts) => exact_or_any_case(files, parts),
+        None if files.reach() == Reach::Anywhere => exact(files, folder, &slashed),
+        None => None,
+    };
     if let Some(name) = named {
-        return Some(Found { name, elsewhere: false });
+        return Ok(Found { name, elsewhere: false });
     }
-    let beside = collapse(folder, &[last]).and_then(|parts| exact_or_any_case(files, &parts))?;
-    Some(Found { name: beside, elsewhere: true })
+    let beside = collapse(folder, &[last]).and_then(|parts| exact_or_any_case(files, &parts));
+    beside.map(|name| Found { name, elsewhere: true }).ok_or_else(|| match inside {
+        _ if slashed.contains("://") => NotFound::Url,
+        None if files.reach() == Reach::Folder => NotFound::Outside,
+        Some(parts) if files.leads_out(&parts.join("/")) => NotFound::Outside,
+        _ => NotFound::Missing,
+    })
+}
+
+/// The name of a file that lies outside the scene's folder.
+fn exact(files: &Files, folder: &str, name: &str) -> Option<String> {
+    let name = match folder {
+        _ if name.starts_with('/') => name.to_owned(),
+        "" => name.to_owned(),
+        folder => format!("{folder}/{name}"),
+    };
+    files.exists(&name).then_some(name)
 }
 
 /// The parts of a path below the scene's folder, `..` resolved; none if it leads outside.
@@ -58,14 +90,12 @@ fn exact_or_any_case(files: &Files, parts: &[&str]) -> Option<String> {
     }
     let mut found = String::new();
     for part in parts {
-        let entries = std::fs::read_dir(files.root().join(&found)).ok()?;
-        let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-        // The smallest, so that the order of the folder does not matter.
-        let name = names.filter(|name| name.to_lowercase() == part.to_lowercase()).min()?;
+        let names = files.names_in(if found.is_empty() { "." } else { &found });
+        let name = names.iter().find(|name| name.to_lowercase() == part.to_lowercase())?;
         if !found.is_empty() {
             found.push('/');
         }
-        found.push_str(&name);
+        found.push_str(name);
     }
     files.exists(&found).then_some(found)
 }
@@ -78,6 +108,7 @@ pub(super) struct Maps {
     by_file: BTreeMap<String, Option<ImageId>>,
     /// The normals of heights, by image, channel and what is beyond its edge.
     of_heights: BTreeMap<(ImageId, &'static str, &'static str), ImageId>,
+    decoder: Images,
 }
 
 impl Maps {
@@ -93,9 +124,12 @@ impl Maps {
         for (slot, map) in material.maps.iter_mut().filter(|(slot, _)| slot.is_read()) {
             let place = format!("{library}:{}", map.line);
             let mut warn = |message: String| warnings.push(Warning::new(place.clone(), message));
-            let Some(found) = find(files, folder, &map.file) else {
-                warn(format!("{} {:?} is not there; left out", slot.statement(), map.file));
-                continue;
+            let found = match find(files, folder, &map.file) {
+                Ok(found) => found,
+                Err(why) => {
+                    warn(format!("{} {:?} {why}; left out", slot.statement(), map.file));
+                    continue;
+                }
             };
             if found.elsewhere {
                 warn(format!("{:?} is not there; {:?} is taken", map.file, found.name));
@@ -113,7 +147,7 @@ impl Maps {
         }
         let next = ImageId(self.images.len() as u32);
         let loaded = match files.read(name) {
-            Ok(bytes) => match decode_image(&bytes, name) {
+            Ok(bytes) => match self.decoder.decode(&bytes, name) {
                 Ok((image, replaced)) => {
                     replaced.into_iter().for_each(|w| warn(w.message));
                     Some(image)
@@ -180,8 +214,8 @@ mod tests {
         std::fs::create_dir_all(folder.path().join("models/Tex")).unwrap();
         std::fs::write(folder.path().join("models/Tex/Wood A.PNG"), "x").unwrap();
         std::fs::write(folder.path().join("models/stone.png"), "x").unwrap();
-        let files = Files::new(folder.path()).unwrap();
-        let name = |written: &str| find(&files, "models", written).map(|f| (f.name, f.elsewhere));
+        let files = Files::new(folder.path(), Reach::Folder).unwrap();
+        let name = |written: &str| find(&files, "models", written).ok().map(|f| (f.name, f.elsewhere));
         let wood = Some(("models/Tex/Wood A.PNG".to_owned(), false));
         for written in ["Tex/Wood A.PNG", "\"tex\\wood a.png\"", "./TEX//wood a.png", "tex/../Tex/Wood A.PNG"]
         {

@@ -60,15 +60,16 @@ pub enum ObjError {
         /// How many of them the file holds.
         count: usize,
     },
-    /// A concave polygon is too large.
+    /// A polygon is too large.
     #[error(
-        "{place}: a concave polygon has {corners} corners, at most {} are read; hint: export triangles",
+        "{place}: a polygon has {corners} corners; at most {}, or {} if it is concave, are read; hint: export triangles",
+        polygon::MAX_CORNERS,
         polygon::MAX_CONCAVE
     )]
     PolygonTooLarge {
         /// The file and the line of the group's first face.
         place: String,
-        /// Its corners.
+        /// Its corners, or as many as were counted.
         corners: usize,
     },
     /// A mesh has too many vertices.
@@ -168,14 +169,19 @@ fn read_libraries(
         let place = format!("{obj}:{line}");
         // One name, blanks included, or several names.
         let candidates = match maps::find(files, folder, written) {
-            Some(found) => vec![(written.as_str(), Some(found))],
-            None => written.split_whitespace().map(|word| (word, maps::find(files, folder, word))).collect(),
+            Ok(found) => vec![(written.as_str(), Ok(found))],
+            Err(_) => {
+                written.split_whitespace().map(|word| (word, maps::find(files, folder, word))).collect()
+            }
         };
         for (written, found) in candidates {
-            let Some(found) = found else {
-                let what = format!("material library {written:?} is not there; its materials get defaults");
-                warnings.push(Warning::new(&place, what));
-                continue;
+            let found = match found {
+                Ok(found) => found,
+                Err(why) => {
+                    let what = format!("material library {written:?} {why}; its materials get defaults");
+                    warnings.push(Warning::new(&place, what));
+                    continue;
+                }
             };
             if !seen.insert(found.name.clone()) {
                 continue;

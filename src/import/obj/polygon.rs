@@ -5,6 +5,9 @@ use glam::{DVec2, DVec3, Vec3};
 /// The most corners that a concave polygon may have: ear clipping takes the square of them.
 pub(super) const MAX_CONCAVE: usize = 4096;
 
+/// The most corners that any polygon may have.
+pub(super) const MAX_CORNERS: usize = 1 << 16;
+
 /// How a polygon went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Triangulation {

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::*;
 use crate::color::Rgb;
+use crate::import::Reach;
 use crate::scene::source::MtlSlot;
 
 type Imported = (Scene<SourceMaterial>, Vec<Warning>);
@@ -13,7 +14,7 @@ fn import_with(obj: &str, others: &[(&str, &[u8])]) -> Result<Imported, ObjError
     for (name, content) in others {
         std::fs::write(folder.path().join(name), content).unwrap();
     }
-    import(&mut Files::new(folder.path()).unwrap(), "a.obj", obj.as_bytes())
+    import(&mut Files::new(folder.path(), Reach::Folder).unwrap(), "a.obj", obj.as_bytes())
 }
 
 fn ok(obj: &str) -> Imported {
@@ -232,7 +233,7 @@ fn damaged_files_never_panic() {
         state as usize % below
     };
     let folder = tempfile::tempdir().unwrap();
-    let mut files = Files::new(folder.path()).unwrap();
+    let mut files = Files::new(folder.path(), Reach::Folder).unwrap();
     let mut read = 0;
     for _ in 0..2000 {
         let mut damaged = obj.as_bytes().to_vec();
@@ -275,7 +276,7 @@ fn the_corpus_is_read() {
     };
     let corpus = std::path::PathBuf::from(corpus);
     for (folder, name, triangles) in [("obj", "teapot.obj", 6320), ("aris/data/meshes", "bunny.obj", 0)] {
-        let mut files = Files::new(&corpus.join(folder)).unwrap();
+        let mut files = Files::new(&corpus.join(folder), Reach::Folder).unwrap();
         let bytes = files.read(name).unwrap();
         let (scene, warnings) = import(&mut files, name, &bytes).unwrap();
         eprintln!("{name}: {} triangles, {warnings:?}", scene.triangle_count());

@@ -14,6 +14,7 @@ pub(in crate::manifest) const MANIFEST: &[&str] = &[
     "light",
     "material",
     "materials",
+    "allow_outside",
     "sheet",
     "compare",
     "output",

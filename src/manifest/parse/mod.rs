@@ -24,7 +24,7 @@ use crate::record::Value;
 use crate::settings::{Display, RenderSettings, ToneCurve};
 
 /// The largest manifest that is read, in bytes.
-const MAX_SIZE: u64 = 16 << 20;
+const MAX_SIZE: u64 = 4 << 20;
 /// The largest number of axes.
 const MAX_AXES: usize = 64;
 /// The largest number of `exclude` tables: each is held against each job.
@@ -87,6 +87,7 @@ fn manifest(reader: &mut Reader, tree: &DeTable<'_>, source: Source) -> Manifest
         scenes,
         scene_is_axis,
         materials: top.get("materials").and_then(|n| reader.text("materials", n)).map(|p| p.value.into()),
+        allow_outside: reader.flag(&top, "allow_outside").unwrap_or_default(),
         set,
         exclude: exclude(reader, &top),
         max_jobs,

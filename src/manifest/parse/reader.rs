@@ -132,6 +132,18 @@ impl Reader {
         items.iter().map(|item| self.text(key, item)).collect()
     }
 
+    /// `true` or `false` of the table.
+    pub(super) fn flag(&mut self, table: &Table<'_, '_>, key: &str) -> Option<bool> {
+        let node = table.get(key)?;
+        match node.get_ref() {
+            DeValue::Boolean(flag) => Some(*flag),
+            _ => {
+                self.expected(key, "true or false", node.span());
+                None
+            }
+        }
+    }
+
     /// A number of the table in `range`.
     pub(super) fn number(
         &mut self,
