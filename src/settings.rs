@@ -1,7 +1,11 @@
-//! The settings of a render that are not part of the scene: size, samples, seed, filter, depth.
+//! The settings of a render that are not part of the scene: size, samples, seed, filter, depth; and how the scene is read.
+
+mod loading;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use loading::{ClearcoatScale, ConvertOptions, ImportOptions, LightUnits, PhongRoughness, Reach};
 
 /// Everything about a render that can change a bit of its result and is not in the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Every module of the crate with its floor, in tenths: a module uses only floors below its own. `color` lies on the ground floor
-/// but above `math`, whose float type it is generic over; `settings` are part of a record.
+/// but above `math`, whose float type it is generic over; `settings` are part of a record and name a model of `disney`.
 const FLOORS: [(&str, u32); 28] = [
     ("cli", 80),
     ("check", 70),
@@ -25,7 +25,7 @@ const FLOORS: [(&str, u32); 28] = [
     ("accel", 30),
     ("light", 30),
     ("record", 20),
-    ("settings", 10),
+    ("settings", 15),
     ("scene", 20),
     ("imagefile", 20),
     ("disney", 10),

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::conversion::Conversion;
-use super::{Allowed, FAILED, Outcome, Talk, WELL, print, tell};
+use super::reading::{Conversion, Reading};
+use super::{FAILED, Outcome, Talk, WELL, print, tell};
 use crate::convert::ConvertOptions;
 use crate::export::{self, Exported, Input, Target, export};
 use crate::import::ImportOptions;
@@ -32,7 +32,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TARGET", value_parser = parse_target, default_value = "library")]
     to: Target,
     #[command(flatten)]
-    allowed: Allowed,
+    reading: Reading,
     /// How to tell what became of the materials, on stdout.
     #[arg(long, value_enum, default_value_t = Report::Table)]
     report: Report,
@@ -56,8 +56,7 @@ fn parse_target(text: &str) -> Result<Target, String> {
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let inputs = export::inputs(&arguments.scenes, &output(arguments))?;
-    let import_options = ImportOptions { reach: arguments.allowed.reach(), ..ImportOptions::default() };
-    let options = (&import_options, &arguments.conversion.options());
+    let options = (&arguments.reading.options(), &arguments.conversion.options());
     let (exported, failed) = convert_all(&inputs, arguments.to, options, talk);
     for warning in exported.iter().flat_map(|e| &e.warnings) {
         talk.say(&format!("warning: {warning}"));

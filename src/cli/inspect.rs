@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::progress::Progress;
+use super::reading::{Conversion, Reading};
 use super::render::parse_enum;
-use super::{Allowed, FAILED, Outcome, Talk, WELL, print, print_bytes, tell};
-use crate::disney::{DiffuseModel, Masking};
+use super::{FAILED, Outcome, Talk, WELL, print, print_bytes, tell};
+use crate::disney::Masking;
 use crate::inspect::eval::{Variant, evaluate};
 use crate::inspect::{Edit, InspectError, MOST, Options, Target, gather, look, numbers, write_report};
 use crate::render::Control;
@@ -41,11 +42,10 @@ pub(super) struct Arguments {
     /// The roughness of the masking term G: matched (that of D) or remapped (0.5 + roughness/2); the material's own where absent.
     #[arg(long, value_name = "G", value_parser = parse_enum::<Masking>)]
     g: Option<Masking>,
-    /// The diffuse term: burley, lambert or lambert_fresnel; the material's own where absent.
-    #[arg(long, value_name = "MODEL", value_parser = parse_enum::<DiffuseModel>)]
-    diffuse: Option<DiffuseModel>,
     #[command(flatten)]
-    allowed: Allowed,
+    reading: Reading,
+    #[command(flatten)]
+    conversion: Conversion,
     /// Samples a pixel of the sphere.
     #[arg(long, value_name = "N", default_value_t = Options::default().spp, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     spp: u32,
@@ -67,7 +67,8 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
 fn inspect(arguments: &Arguments, talk: Talk) -> Result<u8, InspectError> {
     let targets: Vec<Target> = arguments.targets.iter().map(|text| Target::parse(text)).collect();
     let edits: Vec<Edit> = arguments.params.iter().map(|text| Edit::parse(text)).collect::<Result<_, _>>()?;
-    let gathered = gather(&targets, &edits, arguments.allowed.reach(), arguments.g, arguments.diffuse)?;
+    let (import, convert) = (arguments.reading.options(), arguments.conversion.options());
+    let gathered = gather(&targets, &edits, (&import, &convert), arguments.g)?;
     for warning in &gathered.warnings {
         talk.say(&format!("warning: {warning}"));
     }
@@ -105,8 +106,10 @@ fn with_hint(error: InspectError) -> String {
 
 fn evaluate_rows(arguments: &Arguments, file: &Path, talk: Talk) -> Outcome {
     let (bytes, name) = read(file)?;
-    let variant =
-        Variant { masking: arguments.g.unwrap_or_default(), diffuse: arguments.diffuse.unwrap_or_default() };
+    let variant = Variant {
+        masking: arguments.g.unwrap_or_default(),
+        diffuse: arguments.conversion.options().diffuse.unwrap_or_default(),
+    };
     let mut out = Vec::new();
     let summary = evaluate(&bytes, &name, variant, &mut out)?;
     print_bytes(&out)?;

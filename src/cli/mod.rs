@@ -3,11 +3,11 @@
 
 mod accept;
 mod completions;
-mod conversion;
 mod convert;
 mod diff;
 mod inspect;
 mod progress;
+mod reading;
 mod render;
 mod schema;
 mod sweep;

@@ -7,12 +7,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use self::config_root::{Outputs, Shown};
-use super::conversion::Conversion;
 use super::progress::Progress;
-use super::{Allowed, Outcome, Talk, WELL, print};
+use super::reading::{Conversion, Reading};
+use super::{Outcome, Talk, WELL, print};
 use crate::imagefile;
-use crate::import::{ArisConfig, ImportOptions, LightUnits};
+use crate::import::ArisConfig;
 use crate::job::{self, Build, JobError, LoadedRun, LoadedScene, PlannedJob};
+use crate::manifest::edit;
 use crate::output::{stamp, tone};
 use crate::raster::Raster;
 use crate::record::{Job, Override, Value};
@@ -73,24 +74,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILTER", value_parser = parse_enum::<Filter>)]
     filter: Option<Filter>,
     #[command(flatten)]
+    reading: Reading,
+    #[command(flatten)]
     conversion: Conversion,
     /// A material library to lay over the scene's materials, such as `pipeline convert` writes.
     #[arg(long, value_name = "FILE")]
     materials: Option<PathBuf>,
-    /// Read glTF's punctual lights as Blender does: divided by 683.
-    #[arg(long)]
-    blender_lights: bool,
-    /// The material variant of a glTF file (KHR_materials_variants), by name.
-    #[arg(long, value_name = "NAME")]
-    variant: Option<String>,
-    /// The moment of a glTF file's animation that is rendered; without it the pose at rest.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    time: Option<f32>,
-    /// The animation of a glTF file, by name; without it the first.
-    #[arg(long, value_name = "NAME")]
-    animation: Option<String>,
-    #[command(flatten)]
-    allowed: Allowed,
     /// The tone curve of a PNG: neutral, srgb or agx.
     #[arg(long, value_name = "CURVE", value_parser = parse_enum::<ToneCurve>, default_value = "neutral")]
     tone: ToneCurve,
@@ -132,14 +121,9 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     if let (Some(config), Some(shown)) = (&config, arguments.cfg) {
         return config_root::show(config, shown);
     }
-    let import_options = ImportOptions {
-        light_units: if arguments.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
-        variant: arguments.variant.clone(),
-        time: arguments.time,
-        animation: arguments.animation.clone(),
-        reach: arguments.allowed.reach(),
-    };
-    let convert_options = arguments.conversion.options();
+    let (mut import_options, mut convert_options) =
+        (arguments.reading.options(), arguments.conversion.options());
+    edit::choose(&mut import_options, &mut convert_options, &arguments.set)?;
     let materials = arguments.materials.as_deref();
     let run = match &config {
         Some(config) => job::load_configured(config, &convert_options, materials),

@@ -5,60 +5,12 @@ mod gltf;
 mod mtl;
 mod tint;
 
-use serde::{Deserialize, Serialize};
+pub use crate::settings::{ClearcoatScale, ConvertOptions, PhongRoughness};
 
-use crate::disney::{DiffuseModel, Model};
+use crate::disney::Model;
 use crate::record::Warning;
 use crate::scene::source::SourceMaterial;
 use crate::scene::{Material, Named, Scene};
-
-/// What a conversion leaves to its caller.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ConvertOptions {
-    /// The diffuse term of all Disney materials; each dialect has its own where absent ([`DiffuseModel::Burley`] for glTF).
-    pub diffuse: Option<DiffuseModel>,
-    /// How strong a coat is that glTF calls 1.
-    pub clearcoat: ClearcoatScale,
-    /// Multiplies the sheen of glTF's materials, at least 0: Charlie's lobe is 6 to 26 times brighter than Disney's at an equal factor.
-    pub sheen_scale: f32,
-    /// How MTL's exponent becomes a roughness.
-    pub phong: PhongRoughness,
-    /// Whether the backs of glTF's single-sided materials are not there.
-    pub cull: bool,
-}
-
-impl Default for ConvertOptions {
-    fn default() -> Self {
-        let (clearcoat, phong) = (ClearcoatScale::default(), PhongRoughness::default());
-        Self { diffuse: None, clearcoat, sheen_scale: 1.0, phong, cull: false }
-    }
-}
-
-/// How strong a Disney coat is that glTF calls 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ClearcoatScale {
-    /// 4, the factor that Disney's lobe divides by: as bright as glTF's.
-    #[default]
-    Matched,
-    /// 1, as the parameter is published.
-    Published,
-}
-
-named_variants! { ClearcoatScale { Matched "matched", Published "published", } }
-
-/// How MTL's `Ns` becomes a roughness.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PhongRoughness {
-    /// (2/(Ns+2))^¼: a lobe as wide as Phong's (Walter 2007).
-    #[default]
-    Walter,
-    /// 1 - √(Ns/1000), as Blender reads and writes it.
-    Blender,
-}
-
-named_variants! { PhongRoughness { Walter "walter", Blender "blender", } }
 
 /// A converted scene and what the conversion has to say.
 #[derive(Clone, Debug)]
@@ -120,6 +72,7 @@ pub fn to_disney(scene: Scene<SourceMaterial>, options: &ConvertOptions) -> Conv
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::disney::DiffuseModel;
     use crate::scene::source::GltfMaterial;
 
     #[test]

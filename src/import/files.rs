@@ -7,18 +7,10 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use crate::settings::Reach;
+
 /// The largest file that is read, in bytes.
 const MAX_FILE: u64 = 4 << 30;
-
-/// How far the names in a scene lead.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Reach {
-    /// To files in the scene's folder and below, links followed: a scene may come from anyone.
-    #[default]
-    Folder,
-    /// To any file that the user may read.
-    Anywhere,
-}
 
 /// A file that was read and the hash of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]

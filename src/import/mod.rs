@@ -15,15 +15,15 @@ use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 pub(crate) use aris::yaml;
 pub use aris::{ArisConfig, ArisError, ArisRun};
-pub use files::{FileDigest, FileError, Files, Reach};
+pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
 pub use images::{EnvironmentError, Images, read_environment, read_image};
 pub use obj::ObjError;
 pub use validate::InvalidScene;
+
+pub use crate::settings::{ImportOptions, LightUnits, Reach};
 
 use crate::record::Warning;
 use crate::scene::Scene;
@@ -46,37 +46,6 @@ pub struct Imported {
     pub warnings: Vec<Warning>,
     /// Every file that was read, in order: the scene's identity.
     pub files: Vec<FileDigest>,
-}
-
-/// What an import leaves to its caller.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct ImportOptions {
-    /// The unit that the intensities of glTF's punctual lights are read in.
-    pub light_units: LightUnits,
-    /// The variant of glTF's KHR_materials_variants whose materials are taken, by name. None takes the primitives' own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub variant: Option<String>,
-    /// The moment of a glTF file's animation that is shown, in seconds. None, without an animation either, is the rest pose:
-    /// nodes and morph weights as they stand in the file.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub time: Option<f32>,
-    /// The animation that `time` is of, by name. None is the first; one without a time is shown at 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub animation: Option<String>,
-    /// How far the names of files in the scene lead. No part of a job's identity: what was read is.
-    #[serde(skip)]
-    pub reach: Reach,
-}
-
-/// The unit of glTF's punctual lights.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LightUnits {
-    /// Candela and lux as they are, beside emission in nits: all keep their ratio.
-    #[default]
-    Photometric,
-    /// Divided by 683 lm/W, as Blender's importer does.
-    Blender,
 }
 
 /// Why a scene could not be imported.

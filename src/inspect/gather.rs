@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::{Edit, InspectError, Subject};
 use crate::convert::{ConvertOptions, to_disney};
-use crate::disney::{DiffuseModel, Masking, Model};
-use crate::import::{ImportOptions, Reach, import};
+use crate::disney::{Masking, Model};
+use crate::import::{ImportOptions, import};
 use crate::library::Library;
 use crate::manifest::edit::set_material;
 use crate::manifest::nearest::nearest;
@@ -49,21 +49,20 @@ pub struct Gathered {
 }
 
 /// The targets' materials, or the default one if there are no targets; each with `edits`, in every combination of their values, and
-/// with other model variants if they are given. The names in the files lead as far as `reach` says.
+/// with another masking term if it is given. `options` say how files are read and converted, and give a diffuse term to all.
 ///
 /// # Errors
 /// If a file can't be read, or lacks a material, or an edit doesn't suit one.
 pub fn gather(
     targets: &[Target],
     edits: &[Edit],
-    reach: Reach,
+    options: (&ImportOptions, &ConvertOptions),
     masking: Option<Masking>,
-    diffuse: Option<DiffuseModel>,
 ) -> Result<Gathered, InspectError> {
     let mut warnings = Vec::new();
     let mut sources: Vec<(Scene<Material>, Vec<Named<Material>>, String)> = Vec::new();
     for target in targets {
-        let (scene, materials) = load(target, reach, &mut warnings)?;
+        let (scene, materials) = load(target, options, &mut warnings)?;
         let stem = target.file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         sources.push((scene, materials, stem));
     }
@@ -92,7 +91,7 @@ pub fn gather(
                 let mut edited = Named::new(name, material.item.clone());
                 if edited.item.model == Model::Disney {
                     edited.item.masking = masking.unwrap_or(edited.item.masking);
-                    edited.item.diffuse = diffuse.unwrap_or(edited.item.diffuse);
+                    edited.item.diffuse = options.1.diffuse.unwrap_or(edited.item.diffuse);
                 }
                 for (edit, value) in variant {
                     set_material(&mut edited.item, edit.field, value).map_err(InspectError::Edit)?;
@@ -107,13 +106,13 @@ pub fn gather(
 /// The scene of a file with the materials that are asked for.
 fn load(
     target: &Target,
-    reach: Reach,
+    (import_options, convert_options): (&ImportOptions, &ConvertOptions),
     warnings: &mut Vec<Warning>,
 ) -> Result<(Scene<Material>, Vec<Named<Material>>), InspectError> {
     let file = &target.file;
     let is_yaml =
         file.extension().is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"));
-    let of_library = if is_yaml { Library::read(file, reach)? } else { None };
+    let of_library = if is_yaml { Library::read(file, import_options.reach)? } else { None };
     let (scene, materials) = match of_library {
         Some(library) => {
             let scene = library.into_scene()?;
@@ -121,8 +120,8 @@ fn load(
             (scene, materials)
         }
         None => {
-            let imported = import(file, &ImportOptions { reach, ..ImportOptions::default() })?;
-            let converted = to_disney(imported.scene, &ConvertOptions::default());
+            let imported = import(file, import_options)?;
+            let converted = to_disney(imported.scene, convert_options);
             warnings.extend(imported.warnings.into_iter().chain(converted.warnings));
             let materials = converted.scene.materials.clone();
             (converted.scene, materials)
@@ -190,7 +189,13 @@ mod tests {
 
     #[test]
     fn without_a_target_the_default_material_is_looked_at() {
-        let gathered = gather(&[], &edits(&["roughness=0.25"]), Reach::Folder, None, None).unwrap();
+        let gathered = gather(
+            &[],
+            &edits(&["roughness=0.25"]),
+            (&ImportOptions::default(), &ConvertOptions::default()),
+            None,
+        )
+        .unwrap();
         let [subject] = &gathered.subjects[..] else { panic!("{gathered:?}") };
         assert_eq!((subject.name.as_str(), subject.scalar(Parameter::Roughness)), ("default", 0.25));
     }
@@ -198,15 +203,25 @@ mod tests {
     #[test]
     fn lists_of_values_make_every_combination_up_to_a_limit() {
         let both = edits(&["roughness=0.1,0.5", "metallic=0,0.5,1", "sheen=1"]);
-        let gathered = gather(&[], &both, Reach::Folder, Some(Masking::Remapped), None).unwrap();
+        let gathered = gather(
+            &[],
+            &both,
+            (&ImportOptions::default(), &ConvertOptions::default()),
+            Some(Masking::Remapped),
+        )
+        .unwrap();
         let names: Vec<&str> = gathered.subjects.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(names.len(), 6);
         assert_eq!(names[1], "roughness=0.1 metallic=0.5");
         assert!(gathered.subjects.iter().all(|s| s.scalar(Parameter::Sheen) == 1.0));
         assert!(gathered.subjects.iter().all(|s| s.material.masking == Masking::Remapped));
-        let many =
-            gather(&[], &edits(&["roughness=0,.1,.2,.3,.4,.5,.6,.7,.8,.9"]), Reach::Folder, None, None)
-                .unwrap();
+        let many = gather(
+            &[],
+            &edits(&["roughness=0,.1,.2,.3,.4,.5,.6,.7,.8,.9"]),
+            (&ImportOptions::default(), &ConvertOptions::default()),
+            None,
+        )
+        .unwrap();
         assert_eq!((many.subjects.len(), many.left_out.len()), (MOST, 2));
     }
 
@@ -217,7 +232,13 @@ mod tests {
         assert_eq!(Target::parse("a.glb#ball"), target("a.glb", Some("ball")));
         assert_eq!(Target::parse("a.glb#Metal #2"), target("a.glb", Some("Metal #2")));
         assert_eq!(Target::parse("a.glb"), target("a.glb", None));
-        let missing = gather(&[target("none.yaml", None)], &[], Reach::Folder, None, None).unwrap_err();
+        let missing = gather(
+            &[target("none.yaml", None)],
+            &[],
+            (&ImportOptions::default(), &ConvertOptions::default()),
+            None,
+        )
+        .unwrap_err();
         assert!(missing.to_string().contains("none.yaml"));
     }
 }

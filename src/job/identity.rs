@@ -79,7 +79,8 @@ pub(super) fn identify(
         files: files.iter().map(|f| (f.name.as_str(), f.digest.to_hex().to_string())).collect(),
         import: options.0,
         convert: options.1,
-        overrides: job.overrides.iter().map(without_path).collect(),
+        // How the scene is read is in the options, whoever chose it.
+        overrides: job.overrides.iter().filter(|o| !is_of_reading(o)).map(without_path).collect(),
         settings,
     };
     let text = serde_json::to_vec(&content).expect("plain data has a JSON form");
@@ -88,6 +89,10 @@ pub(super) fn identify(
     identity.update(key.as_bytes());
     identity.update(build.executable.as_bytes());
     (identity.finalize().to_hex().to_string(), key.to_hex().to_string())
+}
+
+fn is_of_reading(given: &Override) -> bool {
+    ["import.", "convert."].iter().any(|root| given.path.starts_with(root))
 }
 
 /// An override that names a file, without the name: how a path is written says nothing about the image, and its content is among

@@ -68,8 +68,8 @@ impl Checker<'_> {
         value: &Located<Value>,
     ) -> Finding {
         match (Target::parse(&path.value), &value.value) {
-            // The caller chose the scene by it.
-            (Ok(Target::Scene), _) => return Finding::Fine,
+            // The caller chose the scene by it, and how it is read.
+            (Ok(Target::Scene | Target::Import(_) | Target::Convert(_)), _) => return Finding::Fine,
             // A fixed spot angle alone may exceed the other, a lens or pose field alone contradict the camera: judged together.
             (Ok(Target::Camera(field)), _) if field != super::edit::CameraField::Name => {
                 return Finding::Fine;

@@ -4,6 +4,7 @@
 mod open;
 mod present;
 mod run;
+mod scenes;
 
 use std::path::PathBuf;
 
@@ -27,6 +28,9 @@ pub struct SweepResult {
 /// Why a sweep can't be run, or its sheet not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
+    /// A path that says how a scene is read doesn't take its value.
+    #[error(transparent)]
+    Path(#[from] crate::manifest::edit::EditError),
     /// The manifest can't be read, or is wrong, by itself or for its scene.
     #[error(transparent)]
     Manifest(#[from] crate::manifest::ManifestErrors),

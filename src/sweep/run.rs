@@ -4,12 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::scenes::Scenes;
 use super::{Sweep, SweepError, SweepResult, present};
 use crate::compare::{Limits, StrictLimits, Thresholds, find_idiff};
-use crate::convert::ConvertOptions;
 use crate::imagefile;
-use crate::import::ImportOptions;
-use crate::job::{self, Build, Destination, JobError, LoadedScene, References};
+use crate::job::{self, Build, Destination, LoadedScene, References};
 use crate::manifest::{self, CompareSpec};
 use crate::record::{Job, JobRecord, Outcome};
 use crate::render::Control;
@@ -89,12 +88,12 @@ pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Res
     let mut records: Vec<(usize, JobRecord)> = Vec::new();
     let mut reused = 0;
     let wanted = options.shard.map(|shard| shard.names(&sweep.jobs));
-    for (index, job) in scene_by_scene(&sweep.jobs) {
+    for (index, job, reading) in scenes.scene_by_scene(&sweep.jobs)? {
         if wanted.as_ref().is_some_and(|names| !names.contains(job.name.as_str())) {
             observer.left_out(job);
             continue;
         }
-        match run_job(job, scenes.get(&job.scene), &build, &destination, options, observer)? {
+        match run_job(job, scenes.get(&reading), &build, &destination, options, observer)? {
             Turn::Reused(record) => {
                 reused += 1;
                 observer.finished(&record, true);
@@ -126,9 +125,9 @@ pub fn check(sweep: &Sweep) -> Result<Vec<String>, SweepError> {
 
 fn check_with(sweep: &Sweep, scenes: &mut Scenes) -> Result<Vec<String>, SweepError> {
     let mut unreadable = Vec::new();
-    for path in scene_paths(&sweep.jobs) {
-        match scenes.get(path) {
-            Ok(loaded) => manifest::check(&sweep.manifest, &loaded.scene, path)?,
+    for reading in scenes.readings(&sweep.jobs)? {
+        match scenes.get(&reading) {
+            Ok(loaded) => manifest::check(&sweep.manifest, &loaded.scene, &reading.path)?,
             Err(error) => unreadable.push(error),
         }
     }
@@ -167,65 +166,6 @@ fn run_job(
     let control = Arc::new(Control::default());
     observer.started(job, &control);
     Ok(Turn::Done(job::run(&planned, loaded, build, destination, &control)?))
-}
-
-/// Loaded scenes: only the last one is kept, since jobs come scene by scene, but every failure.
-#[derive(Default)]
-struct Scenes {
-    /// The library that is laid over each.
-    materials: Option<PathBuf>,
-    options: ImportOptions,
-    last: Option<(PathBuf, LoadedScene)>,
-    failed: BTreeMap<PathBuf, String>,
-}
-
-impl Scenes {
-    fn of(sweep: &Sweep) -> Self {
-        let materials = sweep.manifest.materials.as_ref().map(|file| sweep.manifest.folder().join(file));
-        let options = ImportOptions { reach: sweep.reach, ..ImportOptions::default() };
-        Self { materials, options, ..Self::default() }
-    }
-
-    fn get(&mut self, path: &Path) -> Result<&LoadedScene, String> {
-        if let Some(error) = self.failed.get(path) {
-            return Err(error.clone());
-        }
-        if self.last.as_ref().is_none_or(|(last, _)| last != path) {
-            self.last = None;
-            let materials = self.materials.as_deref();
-            let load = |path| -> Result<LoadedScene, JobError> {
-                job::load(path, &self.options, &ConvertOptions::default(), materials)
-            };
-            match load(path) {
-                Ok(loaded) => self.last = Some((path.to_owned(), loaded)),
-                Err(error) => {
-                    let message = error.to_string();
-                    self.failed.insert(path.to_owned(), message.clone());
-                    return Err(message);
-                }
-            }
-        }
-        self.last.as_ref().map(|(_, loaded)| loaded).ok_or_else(String::new)
-    }
-}
-
-/// The scenes of the jobs, each once, in order.
-fn scene_paths(jobs: &[Job]) -> Vec<&Path> {
-    let mut paths: Vec<&Path> = Vec::new();
-    for job in jobs {
-        if !paths.contains(&job.scene.as_path()) {
-            paths.push(&job.scene);
-        }
-    }
-    paths
-}
-
-/// The jobs with their places, those of one scene together, so that each scene is loaded once.
-fn scene_by_scene(jobs: &[Job]) -> Vec<(usize, &Job)> {
-    let scenes = scene_paths(jobs);
-    let mut ordered: Vec<(usize, &Job)> = jobs.iter().enumerate().collect();
-    ordered.sort_by_key(|(_, job)| scenes.iter().position(|scene| *scene == job.scene));
-    ordered
 }
 
 /// The folder of results and those that job names lead into, without what a killed run left half written.

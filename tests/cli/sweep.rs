@@ -1,6 +1,6 @@
 //! A sweep's files, its table, and what a second run does again.
 
-use crate::support::{Desk, SMALL, SQUARE, leftovers, three_jobs};
+use crate::support::{Desk, SMALL, SQUARE, leftovers, same_pixels, three_jobs};
 
 const JOBS: [&str; 3] = ["roughness=0.10", "roughness=0.50", "roughness=0.90"];
 
@@ -127,4 +127,74 @@ fn list_and_dry_run_tell_the_jobs_and_do_nothing() {
         assert!(dry.stdout.contains(&format!("  material.metallic.roughness = {value}\n")), "{}", dry.stdout);
     }
     assert!(desk.names("results").is_empty());
+}
+
+/// A triangle that faces the camera, in white or, for the variant "night", in black; the animation moves it out of sight within a second.
+const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}],
+    "nodes": [{"mesh": 0}, {"camera": 0, "translation": [0.2, 0.2, 2]}],
+    "cameras": [{"type": "perspective", "perspective": {"yfov": 0.3, "znear": 0.1, "aspectRatio": 1}}],
+    "materials": [{"name": "day", "pbrMetallicRoughness": {"metallicFactor": 0}}, {"name": "night", "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0,
+        "extensions": {"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [0]}]}}}]}],
+    "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+        "samplers": [{"input": 1, "output": 2}]}],
+    "accessors": [
+        {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+        {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+        {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
+        {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+    "buffers": [{"byteLength": 68, "uri": "data:application/octet-stream;base64,@"}],
+    "extensions": {"KHR_materials_variants": {"variants": [{"name": "night"}]}},
+    "extensionsUsed": ["KHR_materials_variants"]}"#;
+
+#[test]
+fn variants_moments_and_conversions_are_axes() {
+    let values = [0.0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 1., 0., 0., 0., 9., 0., 0.];
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let manifest = "scene = 'triangle.gltf'\n[render]\nwidth = 8\nheight = 8\nspp = 4\n\
+        [[axis]]\npath = 'import.variant'\nvalues = [false, 'night']\nlabels = ['day', 'night']\n\
+        [[axis]]\npath = 'import.time'\nvalues = [0, 1]\n\
+        [[axis]]\npath = 'convert.diffuse'\nvalues = ['burley', 'lambert']\n";
+    let desk = Desk::new(manifest);
+    let text =
+        TRIANGLE.replace('@', &base64::Engine::encode(&base64::engine::general_purpose::STANDARD, bytes));
+    std::fs::write(desk.path("triangle.gltf"), text).unwrap();
+    desk.sweep(&[]).ends_with(0).says("8 jobs: 8 rendered");
+    let middle = |name: &str| {
+        let raster = desk.raster(&format!("results/{name}.exr"));
+        raster.picture().rgb().expect("a colour picture")[0][8 * 4 + 4]
+    };
+    let at = |variant: &str, time: &str, diffuse: &str| {
+        middle(&format!("variant={variant},time={time},diffuse={diffuse}"))
+    };
+    assert!(at("day", "0", "burley") > 3.0 * at("night", "0", "burley"));
+    assert!(at("day", "0", "burley") != at("day", "0", "lambert"));
+    assert!(at("day", "1", "burley") == at("night", "1", "burley"), "out of sight");
+    // The same picture as alone, and nothing to do again.
+    desk.run([
+        "render",
+        "triangle.gltf",
+        "-o",
+        "alone.exr",
+        "--variant",
+        "night",
+        "--time",
+        "0",
+        "--width",
+        "8",
+        "--height",
+        "8",
+        "--spp",
+        "4",
+        "--set",
+        "convert.diffuse=lambert",
+    ])
+    .ends_with(0);
+    let alone = desk.raster("alone.exr");
+    assert!(same_pixels(&alone, &desk.raster("results/variant=night,time=0,diffuse=lambert.exr")));
+    desk.sweep(&[]).ends_with(0).says("8 jobs: 0 rendered, 8 reused");
+    // A name that the file doesn't have is told by each job that asks for it.
+    desk.rewrite(&manifest.replace("'night']", "'noon']"));
+    desk.sweep(&["--dry-run"]).tells("noon");
 }

@@ -28,7 +28,7 @@ pub(super) enum Shown {
 pub(super) fn composed(arguments: &Arguments) -> Result<Option<ArisConfig>, Box<dyn std::error::Error>> {
     let path = &arguments.scene;
     if ArisConfig::is_root(path) {
-        let config = ArisConfig::compose(path, &arguments.overrides, arguments.allowed.reach());
+        let config = ArisConfig::compose(path, &arguments.overrides, arguments.reading.options().reach);
         return Ok(Some(config.map_err(Box::new)?));
     }
     let why_not = format!("{} is no config root, a folder with render.yaml", path.display());

@@ -149,3 +149,24 @@ mod tests {
         assert_eq!(MaterialField::Model.parameter(), None);
     }
 }
+
+fields! {
+    /// A choice of the import.
+    ImportField {
+        Variant "variant": "the name of one of the file's material variants, or false for the materials' own",
+        Time "time": "a number of seconds, or false for the pose at rest",
+        Animation "animation": "the name of one of the file's animations, or false for the first",
+        LightUnits "light_units": "one of \"photometric\", \"blender\"",
+    }
+}
+
+fields! {
+    /// A choice of the conversion.
+    ConvertField {
+        Diffuse "diffuse": "one of \"burley\", \"lambert\", \"lambert_fresnel\", or false for the dialect's own",
+        Clearcoat "clearcoat": "one of \"matched\", \"published\"",
+        SheenScale "sheen_scale": "a number, not negative",
+        Phong "phong": "one of \"walter\", \"blender\"",
+        Cull "cull": "true or false",
+    }
+}

@@ -9,6 +9,7 @@
 //! | `camera.FIELD` | [`CameraField`], of the camera that renders |
 //! | `environment.FIELD` | [`EnvironmentField`]; a white one is made where the scene has none |
 //! | `render.FIELD` | [`RenderField`] |
+//! | `import.FIELD`, `convert.FIELD` | [`ImportField`], [`ConvertField`]: [`choose`] makes these choices before the scene is read |
 //! | `scene` | the file: for the manifest, not for a loaded scene |
 
 mod camera;
@@ -16,6 +17,7 @@ mod environment;
 mod error;
 mod field;
 mod light;
+mod loading;
 mod material;
 mod render;
 mod target;
@@ -26,7 +28,10 @@ mod value;
 use std::path::Path;
 
 pub use error::{BoxedError, EditError, Half};
-pub use field::{CameraField, EnvironmentField, LightField, MaterialField, RenderField};
+pub use field::{
+    CameraField, ConvertField, EnvironmentField, ImportField, LightField, MaterialField, RenderField,
+};
+pub use loading::choose;
 pub use target::{NamePattern, Target};
 
 use self::camera::CameraEdits;
@@ -37,7 +42,7 @@ use crate::manifest::nearest::nearest;
 use crate::record::{Override, Value};
 use crate::scene::light::LightKind;
 use crate::scene::{Image, Light, Material, Named, Scene};
-use crate::settings::RenderSettings;
+use crate::settings::{ConvertOptions, ImportOptions, RenderSettings};
 
 /// The largest whole number that a value holds exactly: 2^53.
 pub const MAX_WHOLE: u64 = render::MAX_WHOLE;
@@ -54,6 +59,8 @@ impl Target {
             Self::Light(_, field) => field.expects(),
             Self::Environment(field) => field.expects(),
             Self::Render(field) => field.expects(),
+            Self::Import(field) => field.expects(),
+            Self::Convert(field) => field.expects(),
             Self::Scene => "the file of a scene",
         }
     }
@@ -74,6 +81,8 @@ pub fn check_value(path: &str, value: &Value) -> Result<Target, EditError> {
         Target::Camera(field) => CameraEdits::default().add(*field, value),
         Target::Environment(field) => environment::set(&mut None, *field, value),
         Target::Render(field) => render::set(&mut RenderSettings::default(), *field, value),
+        Target::Import(field) => loading::set_import(&mut ImportOptions::default(), *field, value),
+        Target::Convert(field) => loading::set_convert(&mut ConvertOptions::default(), *field, value),
         Target::Scene => value::text(value).map(drop),
     };
     checked.map_err(|Mismatch| mismatch(path, value, target.expects()))?;
@@ -157,6 +166,8 @@ pub fn apply_all(
                 }
             }
             Target::Render(field) => render::set(settings, *field, value).map_err(wrong)?,
+            // Made when the scene was read.
+            Target::Import(_) | Target::Convert(_) => {}
             Target::Scene => return Err(EditError::SceneItself),
         }
     }

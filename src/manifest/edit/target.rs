@@ -1,11 +1,14 @@
 //! What a path reaches.
 
 use super::error::EditError;
-use super::field::{CameraField, EnvironmentField, LightField, MaterialField, RenderField};
+use super::field::{
+    CameraField, ConvertField, EnvironmentField, ImportField, LightField, MaterialField, RenderField,
+};
 use crate::manifest::nearest::nearest;
 
 /// What paths begin with.
-pub(super) const ROOTS: &[&str] = &["material", "camera", "light", "environment", "render", "scene"];
+pub(super) const ROOTS: &[&str] =
+    &["material", "camera", "light", "environment", "render", "import", "convert", "scene"];
 
 /// What a path reaches, in any scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +23,10 @@ pub enum Target {
     Environment(EnvironmentField),
     /// `render.FIELD`.
     Render(RenderField),
+    /// `import.FIELD`.
+    Import(ImportField),
+    /// `convert.FIELD`.
+    Convert(ConvertField),
     /// `scene`: the file.
     Scene,
 }
@@ -73,6 +80,20 @@ impl Target {
                 let field =
                     RenderField::from_name(field).ok_or_else(|| unknown("the render", field, known()))?;
                 Ok(Self::Render(field))
+            }
+            "import" => {
+                let field = only_field(path, rest, "import.FIELD")?;
+                let known = || ImportField::ALL.iter().map(|f| f.name());
+                let field =
+                    ImportField::from_name(field).ok_or_else(|| unknown("the import", field, known()))?;
+                Ok(Self::Import(field))
+            }
+            "convert" => {
+                let field = only_field(path, rest, "convert.FIELD")?;
+                let known = || ConvertField::ALL.iter().map(|f| f.name());
+                let field = ConvertField::from_name(field)
+                    .ok_or_else(|| unknown("the conversion", field, known()))?;
+                Ok(Self::Convert(field))
             }
             "scene" if path == "scene" => Ok(Self::Scene),
             "scene" => Err(EditError::Incomplete { path: shortened(path), form: "scene" }),

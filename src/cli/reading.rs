@@ -1,8 +1,41 @@
-//! The choices that converting materials leaves to the user.
+//! The choices that reading scenes and converting their materials leave to the user.
 
+use super::Allowed;
 use super::render::parse_enum;
 use crate::convert::{ClearcoatScale, ConvertOptions, PhongRoughness};
 use crate::disney::DiffuseModel;
+use crate::import::{ImportOptions, LightUnits};
+
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Reading of scenes")]
+pub(super) struct Reading {
+    /// Read glTF's punctual lights as Blender does: divided by 683.
+    #[arg(long)]
+    blender_lights: bool,
+    /// The material variant of a glTF file (KHR_materials_variants), by name.
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
+    /// The moment of a glTF file's animation that is taken; without it the pose at rest.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    time: Option<f32>,
+    /// The animation of a glTF file, by name; without it the first.
+    #[arg(long, value_name = "NAME")]
+    animation: Option<String>,
+    #[command(flatten)]
+    allowed: Allowed,
+}
+
+impl Reading {
+    pub(super) fn options(&self) -> ImportOptions {
+        ImportOptions {
+            light_units: if self.blender_lights { LightUnits::Blender } else { LightUnits::Photometric },
+            variant: self.variant.clone(),
+            time: self.time,
+            animation: self.animation.clone(),
+            reach: self.allowed.reach(),
+        }
+    }
+}
 
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Conversion of materials")]

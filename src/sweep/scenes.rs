@@ -1,0 +1,96 @@
+//! The scenes of a sweep's jobs, each loaded once.
+
+use std::path::PathBuf;
+
+use super::Sweep;
+use crate::convert::ConvertOptions;
+use crate::import::ImportOptions;
+use crate::job::{self, LoadedScene};
+use crate::manifest::edit;
+use crate::record::Job;
+
+/// A scene's file and how it is read: what jobs share that need the same scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Reading {
+    pub(super) path: PathBuf,
+    import: ImportOptions,
+    convert: ConvertOptions,
+}
+
+/// Loaded scenes: only the last one is kept, since jobs come scene by scene, but every failure.
+pub(super) struct Scenes {
+    /// The library that is laid over each.
+    materials: Option<PathBuf>,
+    import: ImportOptions,
+    last: Option<(Reading, LoadedScene)>,
+    failed: Vec<(Reading, String)>,
+}
+
+impl Scenes {
+    pub(super) fn of(sweep: &Sweep) -> Self {
+        let materials = sweep.manifest.materials.as_ref().map(|file| sweep.manifest.folder().join(file));
+        let import = ImportOptions { reach: sweep.reach, ..ImportOptions::default() };
+        Self { materials, import, last: None, failed: Vec::new() }
+    }
+
+    /// What a job needs.
+    ///
+    /// # Errors
+    /// If an override doesn't suit its path.
+    pub(super) fn reading(&self, job: &Job) -> Result<Reading, edit::EditError> {
+        let (path, import) = (job.scene.clone(), self.import.clone());
+        let mut reading = Reading { path, import, convert: ConvertOptions::default() };
+        edit::choose(&mut reading.import, &mut reading.convert, &job.overrides)?;
+        Ok(reading)
+    }
+
+    /// What the jobs need, each once, in order.
+    ///
+    /// # Errors
+    /// As [`Self::reading`].
+    pub(super) fn readings(&self, jobs: &[Job]) -> Result<Vec<Reading>, edit::EditError> {
+        let mut readings: Vec<Reading> = Vec::new();
+        for job in jobs {
+            let reading = self.reading(job)?;
+            if !readings.contains(&reading) {
+                readings.push(reading);
+            }
+        }
+        Ok(readings)
+    }
+
+    /// The jobs with their places and what they need, those of one scene together, so that each scene is loaded once.
+    ///
+    /// # Errors
+    /// As [`Self::reading`].
+    pub(super) fn scene_by_scene<'j>(
+        &self,
+        jobs: &'j [Job],
+    ) -> Result<Vec<(usize, &'j Job, Reading)>, edit::EditError> {
+        let readings = self.readings(jobs)?;
+        let with_reading = |(index, job)| Ok((index, job, self.reading(job)?));
+        let mut ordered: Vec<_> = jobs.iter().enumerate().map(with_reading).collect::<Result<_, _>>()?;
+        ordered.sort_by_key(|(_, _, wanted)| readings.iter().position(|reading| reading == wanted));
+        Ok(ordered)
+    }
+
+    /// The scene, or why it can't be loaded.
+    pub(super) fn get(&mut self, wanted: &Reading) -> Result<&LoadedScene, String> {
+        if let Some((_, error)) = self.failed.iter().find(|(reading, _)| reading == wanted) {
+            return Err(error.clone());
+        }
+        if self.last.as_ref().is_none_or(|(last, _)| last != wanted) {
+            self.last = None;
+            let Reading { path, import, convert } = wanted;
+            match job::load(path, import, convert, self.materials.as_deref()) {
+                Ok(loaded) => self.last = Some((wanted.clone(), loaded)),
+                Err(error) => {
+                    let message = error.to_string();
+                    self.failed.push((wanted.clone(), message.clone()));
+                    return Err(message);
+                }
+            }
+        }
+        self.last.as_ref().map(|(_, loaded)| loaded).ok_or_else(String::new)
+    }
+}
