@@ -8,16 +8,15 @@ use crate::convert::Quality;
 use crate::export::ExportError;
 use crate::scene::camera::{Aperture, FovAxis, Lens, Projection};
 use crate::scene::{Camera, Material, Scene};
-use crate::settings::RenderSettings;
 
-/// The sensor for a picture of `size`, and a word for each thing that it can't do as our camera does.
+/// The sensor for a picture of `width` × `height` pixels, and a word for each thing that it can't do as our camera does.
 ///
 /// # Errors
 /// If the camera is sheared, which Mitsuba's are not, or lies in a plane.
 pub(super) fn sensor(
     scene: &Scene<Material>,
     camera: &Camera,
-    (width, height): (u32, u32),
+    [width, height]: [u32; 2],
 ) -> Result<(Element, Vec<Told>), ExportError> {
     let mut notes = Vec::new();
     let (axes, scale) = axes_and_scale(camera)?;
@@ -54,14 +53,13 @@ pub(super) fn sensor(
         }
     };
     let reach = reach(scene, camera);
-    let settings = RenderSettings::default();
     let film = Element::plugin("film", "hdrfilm")
-        .integer("width", width)
-        .integer("height", height)
+        .integer_of("width", "resx")
+        .integer_of("height", "resy")
         .string("pixel_format", "rgb")
         .string("component_format", "float32")
         .with(Element::plugin("rfilter", "box"));
-    let sampler = Element::plugin("sampler", "independent").integer("sample_count", settings.spp);
+    let sampler = Element::plugin("sampler", "independent").integer_of("sample_count", "spp");
     let sensor = sensor.float("near_clip", reach * 1e-6).float("far_clip", reach * 10.0);
     Ok((sensor.with(film).with(sampler), notes))
 }

@@ -29,6 +29,11 @@ impl Element {
         Self::new(tag).attribute("type", kind)
     }
 
+    /// What `$NAME` stands for unless the caller says otherwise, as in `mitsuba -D NAME=VALUE scene.xml`.
+    pub(super) fn default_of(name: &str, value: u32) -> Self {
+        Self::new("default").named(name).attribute("value", value.to_string())
+    }
+
     /// The object that is called `id` elsewhere.
     pub(super) fn reference(id: &str) -> Self {
         Self::new("ref").attribute("id", id)
@@ -64,6 +69,11 @@ impl Element {
 
     pub(super) fn integer(self, name: &str, value: u32) -> Self {
         self.value("integer", name, value.to_string())
+    }
+
+    /// An integer that is what `$VARIABLE` stands for.
+    pub(super) fn integer_of(self, name: &str, variable: &str) -> Self {
+        self.value("integer", name, format!("${variable}"))
     }
 
     pub(super) fn boolean(self, name: &str, value: bool) -> Self {

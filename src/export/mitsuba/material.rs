@@ -72,6 +72,21 @@ pub(super) fn may(material: &Material, parameter: Parameter) -> bool {
     material.scalar(parameter).constant().is_none_or(|value| value > 0.0)
 }
 
+/// Whether a parameter that may be above 0 has anything to say.
+fn matters(material: &Material, parameter: Parameter) -> bool {
+    let of_what = match parameter {
+        Parameter::SheenTint => Parameter::Sheen,
+        Parameter::ClearcoatGloss => Parameter::Clearcoat,
+        other => other,
+    };
+    may(material, parameter) && may(material, of_what)
+}
+
+/// The coefficients of the medium inside, if it takes any light.
+pub(super) fn absorption(material: &Material) -> Option<Rgb> {
+    Some(material.absorption).filter(|absorption| material.is_interface() && !absorption.is_black())
+}
+
 /// Nothing but a smooth interface: Mitsuba has the same.
 pub(super) fn is_smooth_glass(material: &Material) -> bool {
     let is = |p: Parameter, value: f32| material.scalar(p).constant() == Some(value);
@@ -127,30 +142,39 @@ impl Bsdfs<'_, '_> {
             .float("ext_ior", 1.0)
     }
 
-    /// A surface, blended with the sheets that let light pass: our BSDF is linear in either part.
+    /// A surface, blended with the sheets that let light pass where it is no metal: our BSDF is linear in either part.
     fn disney(&mut self, material: &Material) -> Element {
+        let dielectric = 1.0 - self.mean(material, Parameter::Metallic);
         let interface = may(material, Parameter::SpecTrans);
         let mut bsdf = self.principled(material);
         if !interface || material.thin_walled {
             bsdf = sided(material, bsdf);
         }
         if interface && material.thin_walled {
-            let (tint, power) = tint(material);
-            let sheet = Element::plugin("bsdf", "principledthin")
-                .float("eta", self.mean(material, Parameter::Ior))
-                .float("spec_trans", 1.0);
-            let sheet = self.color(sheet, "base_color", tint, power);
-            let sheet = self.scalar(sheet, "roughness", material.scalar(Parameter::Roughness), 1.0);
-            let sheet = self.scalar(sheet, "anisotropic", material.scalar(Parameter::Anisotropic), 1.0);
-            bsdf = self.blend(bsdf, sheet, material.scalar(Parameter::SpecTrans), 1.0);
+            let sheet = self.sheet(material);
+            bsdf = self.blend(bsdf, sheet, material.scalar(Parameter::SpecTrans), dielectric);
         }
         if may(material, Parameter::DiffTrans) {
             let color = material.diff_trans_color.as_ref().unwrap_or(&material.base_color);
             let leaf = Element::plugin("bsdf", "principledthin").float("diff_trans", 2.0);
             let leaf = self.color(leaf, "base_color", color, Power::One);
-            bsdf = self.blend(bsdf, leaf, material.scalar(Parameter::DiffTrans), 0.5);
+            bsdf = self.blend(bsdf, leaf, material.scalar(Parameter::DiffTrans), 0.5 * dielectric);
         }
         bsdf
+    }
+
+    /// A sheet that reflects and lets pass without diffuse light.
+    fn sheet(&mut self, material: &Material) -> Element {
+        let (tint, power) = tint(material);
+        let sheet = Element::plugin("bsdf", "principledthin")
+            .float("eta", self.mean(material, Parameter::Ior))
+            .float("spec_trans", 1.0);
+        let sheet = self.color(sheet, "base_color", tint, power);
+        let sheet = self.scalar(sheet, "roughness", material.scalar(Parameter::Roughness), 1.0);
+        if !may(material, Parameter::Anisotropic) {
+            return sheet;
+        }
+        self.scalar(sheet, "anisotropic", material.scalar(Parameter::Anisotropic), 1.0)
     }
 
     /// All that isn't thin.
@@ -166,7 +190,7 @@ impl Bsdfs<'_, '_> {
         };
         element = self.scalar(element, "roughness", material.scalar(Parameter::Roughness), 1.0);
         for (parameter, name, factor) in SCALARS {
-            if may(material, parameter) {
+            if matters(material, parameter) {
                 element = self.scalar(element, name, material.scalar(parameter), factor);
             }
         }
@@ -184,6 +208,9 @@ impl Bsdfs<'_, '_> {
 
     /// `weight` times `factor` of `second`, and the rest of `first`.
     fn blend(&mut self, first: Element, second: Element, weight: &Param<f32>, factor: f32) -> Element {
+        if factor == 0.0 {
+            return first;
+        }
         if weight.constant().is_some_and(|weight| weight * factor >= 1.0) {
             return second;
         }
@@ -279,4 +306,14 @@ fn sided(material: &Material, bsdf: Element) -> Element {
 
 fn mesh_attribute(parameter: &str, attribute: &str) -> Element {
     Element::plugin("texture", "mesh_attribute").named(parameter).string("name", attribute)
+}
+
+/// The medium inside an interface: it takes light and scatters none.
+pub(super) fn medium(absorption: Rgb) -> Element {
+    // Colours end at 1, the factor doesn't.
+    let largest = absorption.max_channel();
+    Element::plugin("medium", "homogeneous")
+        .rgb("albedo", Rgb::BLACK)
+        .rgb("sigma_t", absorption / largest)
+        .float("scale", largest)
 }

@@ -8,6 +8,8 @@ mod mesh;
 mod texture;
 mod told;
 
+use std::collections::BTreeMap;
+
 use element::Element;
 use material::Bsdfs;
 use mesh::Placed;
@@ -19,7 +21,7 @@ use crate::convert::{Note, Quality};
 use crate::render::image_size;
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::material::{Material, Sides};
-use crate::scene::{Named, Scene, framing, studio};
+use crate::scene::{Instance, Named, Scene, framing, studio};
 use crate::settings::RenderSettings;
 
 /// The file that is rendered.
@@ -63,7 +65,7 @@ pub(super) fn description(mut scene: Scene<Material>) -> Result<Description, Exp
         files.push((light::ENVIRONMENT.into(), image));
         count += 1;
     }
-    let root = Element::scene().with(integrator()).with(sensor);
+    let root = Element::scene().with_all(sensor).with(integrator(&scene));
     let root = root.with_all(materials).with_all(shapes).with_all(emitters);
     files.push((MAIN.into(), root.document().map_err(ExportError::Xml)?.into_bytes()));
     Ok(Description { files, textures: count, notes })
@@ -95,51 +97,76 @@ fn complete(scene: &mut Scene<Material>) -> Vec<Told> {
     told
 }
 
-/// Depth counts scattering in our settings, and vertices here. Roulette begins at the same vertex.
-fn integrator() -> Element {
-    Element::plugin("integrator", "path")
+/// Depth counts scattering in our settings, and vertices here. Roulette begins at the same vertex. The integrator for media also lets
+/// shadow rays pass what is partly there, as ours do.
+fn integrator(scene: &Scene<Material>) -> Element {
+    let is_open =
+        |material: &Material| !told::is_opaque(material) || material::absorption(material).is_some();
+    let kind = if scene.materials.iter().any(|m| is_open(&m.item)) { "volpath" } else { "path" };
+    Element::plugin("integrator", kind)
         .integer("max_depth", RenderSettings::default().max_depth.saturating_add(1))
         .integer("rr_depth", 5)
 }
 
-/// The first camera.
-fn sensor(scene: &Scene<Material>) -> Result<(Element, Vec<Told>), ExportError> {
+/// The first camera, and what its numbers of pixels and samples are by default.
+fn sensor(scene: &Scene<Material>) -> Result<(Vec<Element>, Vec<Told>), ExportError> {
     let settings = RenderSettings::default();
-    let missing = ExportError::Camera { why: "there is none" };
-    let size = image_size(scene, &settings).map_err(|_| ExportError::Camera { why: "there is none" })?;
-    camera::sensor(scene, &scene.cameras.first().ok_or(missing)?.item, size)
+    let (Some(camera), Ok((width, height))) = (scene.cameras.first(), image_size(scene, &settings)) else {
+        return Err(ExportError::Camera { why: "there is none" });
+    };
+    let (sensor, told) = camera::sensor(scene, &camera.item, [width, height])?;
+    let defaults = [("resx", width), ("resy", height), ("spp", settings.spp)];
+    Ok((
+        defaults.map(|(name, value)| Element::default_of(name, value)).into_iter().chain([sensor]).collect(),
+        told,
+    ))
 }
 
-/// The shapes of the instances, materials by their `ids`; meshes join the `files`.
+/// The shapes, whose materials are called by their `ids`; meshes join the `files`.
 fn shapes(bsdfs: &mut Bsdfs<'_, '_>, ids: &[String], files: &mut Vec<(String, Vec<u8>)>) -> Vec<Element> {
     let scene = bsdfs.scene;
     let mut names = Identifiers::default();
     let mut shapes = Vec::new();
-    for instance in &scene.instances {
-        let mesh = scene.mesh_of(instance);
-        if mesh.triangles.is_empty() {
-            continue;
-        }
-        let material = &scene.materials[instance.material.0 as usize].item;
-        let placed = Placed::new(mesh, instance, material::attributes(material));
+    for instances in alike(scene) {
+        let first = instances[0];
+        let (mesh, material) = (scene.mesh_of(first), &scene.materials[first.material.0 as usize].item);
+        let places = instances.iter().map(|instance| instance.world_from_object);
+        let placed = Placed::new(mesh, material::attributes(material), places);
+        let medium = material::absorption(material).map(|a| material::medium(a).named("interior"));
         let emitter = bsdfs.emitter(material);
-        let mut add = |name: &str, mesh_file: Vec<u8>| {
+        let mut add = |name: &str, bytes: Vec<u8>| {
+            // In lower case, since not every file system tells cases apart.
             let file = format!("meshes/{}.ply", names.of(&name.to_lowercase()));
             let shape = Element::plugin("shape", "ply")
                 .string("filename", &file)
                 .boolean("face_normals", mesh.normals.is_empty())
-                .with(Element::reference(&ids[instance.material.0 as usize]))
+                .with(Element::reference(&ids[first.material.0 as usize]))
+                .with_all(medium.clone())
                 .with_all(emitter.clone());
-            files.push((file, mesh_file));
+            files.push((file, bytes));
             shapes.push(shape);
         };
-        add(&instance.name, placed.front());
+        add(&first.name, placed.front());
         let shines_behind = emitter.is_some() && material.emission.sides == Sides::Both;
         if shines_behind && told::can_shine_behind(material) {
-            add(&format!("{}_back", instance.name), placed.back());
+            add(&format!("{}_back", first.name), placed.back());
         }
     }
     shapes
+}
+
+/// The instances that have triangles, those of the same mesh and material together.
+fn alike(scene: &Scene<Material>) -> Vec<Vec<&Instance>> {
+    let mut group_of = BTreeMap::new();
+    let mut groups: Vec<Vec<&Instance>> = Vec::new();
+    for instance in scene.instances.iter().filter(|i| !scene.mesh_of(i).triangles.is_empty()) {
+        let group = *group_of.entry((instance.mesh, instance.material)).or_insert(groups.len());
+        if group == groups.len() {
+            groups.push(Vec::new());
+        }
+        groups[group].push(instance);
+    }
+    groups
 }
 
 /// The lights without a surface, and the environment.

@@ -1,7 +1,6 @@
 //! What becomes of each field of a material: exact, carried, approximated or dropped, and why.
 
-use super::material::{is_smooth_glass, maps, may, vertex_opacity};
-use crate::color::Rgb;
+use super::material::{absorption, is_smooth_glass, maps, may, vertex_opacity};
 use crate::convert::{Note, Quality};
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
 use crate::scene::material::{Material, ShadingFrame, Sides};
@@ -46,6 +45,7 @@ impl Notes<'_> {
             Model::Dielectric => self.tell("dielectric", Exact, ""),
             Model::Disney if is_smooth_glass(self.material) => {
                 self.tell("disney", Exact, "a smooth interface, which is Mitsuba's dielectric");
+                self.tell_if(absorption(self.material).is_some(), "absorption", Exact, "a medium inside");
             }
             Model::Disney => self.of_disney(),
         }
@@ -89,13 +89,12 @@ impl Notes<'_> {
         );
         self.tell_if(is_not(Parameter::F90, 1.0), "f90", Dropped, "highlights rise to 1 at grazing angles");
         self.of_grain();
+        self.tell_if(absorption(m).is_some(), "absorption", Exact, "a medium inside");
         if transmits {
             self.of_transmission(interface);
         }
         let leaf = "blended with a sheet: highlights, sheen and coat fade by as much as the sheet lets pass";
         self.tell_if(may(m, Parameter::DiffTrans), "diff_trans", Approximated, leaf);
-        let thick = may(m, Parameter::DiffTrans) && !m.thin_walled && !transmits;
-        self.tell_if(thick && m.absorption != Rgb::BLACK, "absorption", Dropped, "there is no inside");
     }
 
     fn of_grain(&mut self) {
@@ -133,11 +132,11 @@ impl Notes<'_> {
                 Approximated,
                 "the square root of the base colour",
             );
-            self.tell_if(m.absorption != Rgb::BLACK, "absorption", Dropped, "there is no medium inside");
         } else {
             self.tell("spec_trans", Exact, "blended with principledthin");
-            let metal = !is_whole && may(m, Parameter::Metallic);
-            self.tell_if(metal, "metallic", Approximated, "the sheet covers metal as well");
+            let partly = |p: Parameter| constant(p) != Some(0.0) && constant(p) != Some(1.0);
+            let reason = "where it is neither 0 nor 1, too much or too little is blended";
+            self.tell_if(partly(Parameter::Metallic), "metallic", Approximated, reason);
         }
     }
 
@@ -182,7 +181,6 @@ impl Notes<'_> {
         if !m.emits() {
             return;
         }
-        let is_there = m.opacity == Default::default() && !m.vertex_alpha;
         match (m.emission.sides, can_shine_behind(m)) {
             (Sides::Front, _) => self.tell("emission", Exact, ""),
             (Sides::Both, true) => {
@@ -190,11 +188,16 @@ impl Notes<'_> {
             }
             (Sides::Both, false) => self.tell("emission", Approximated, "the front alone shines"),
         }
-        self.tell_if(!is_there, "emission", Approximated, "what is cut out shines too");
+        self.tell_if(!is_opaque(m), "emission", Approximated, "what is cut out shines too");
     }
 }
 
 /// A second mesh may stand behind one that shines to both sides: nothing is seen through them.
 pub(super) fn can_shine_behind(material: &Material) -> bool {
-    material.opacity == Default::default() && !material.vertex_alpha && !material.transmits()
+    is_opaque(material) && !material.transmits()
+}
+
+/// All of it is there.
+pub(super) fn is_opaque(material: &Material) -> bool {
+    material.opacity == Default::default() && !material.vertex_alpha
 }
