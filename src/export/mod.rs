@@ -107,7 +107,7 @@ pub fn export(
     let mut notes = converted.notes;
     let name = source.file_name().unwrap_or_default().to_string_lossy();
     let mut textures = TextureFiles::new(scene);
-    let mut count = None;
+    let mut baked = 0;
     let (files, main) = match target {
         Target::Library => {
             let written = library::write(scene, &name);
@@ -129,7 +129,7 @@ pub fn export(
         Target::Mitsuba => {
             let description = mitsuba::description(scene.clone())?;
             notes.extend(description.notes);
-            count = Some(description.textures);
+            baked = description.textures;
             (description.files, mitsuba::MAIN)
         }
     };
@@ -140,7 +140,7 @@ pub fn export(
     }
     let mut warnings = imported.warnings;
     warnings.extend(converted.warnings);
-    let textures = count.unwrap_or_else(|| textures.count());
+    let textures = textures.count() + baked;
     let file = folder.join(main);
     Ok(Exported { source: source.to_owned(), file, materials, textures, notes, warnings })
 }

@@ -35,9 +35,8 @@ fn agree(desk: &Desk, scene: &Path, spp: usize, allowed: f64) {
     let ours = desk.raster("ours.exr");
     let variance = ours.layers.iter().find(|l| l.name == "data").expect("a data part");
     let ours = [planes(&ours.layers[0], ""), planes(variance, "variance.")];
-    let theirs = ["mean", "variance"].map(|name| {
-        planes(&read(&desk.path(&format!("mitsuba/{name}.exr"))).layers[0], "")
-    });
+    let theirs = ["mean", "variance"]
+        .map(|name| planes(&read(&desk.path(&format!("mitsuba/{name}.exr"))).layers[0], ""));
     for (channel, name) in ["red", "green", "blue"].into_iter().enumerate() {
         let of = |[mean, variance]: &[[Vec<f64>; 3]; 2]| [mean[channel].clone(), variance[channel].clone()];
         compare(&of(&ours), &of(&theirs), allowed, &format!("{source}, {name}"));
@@ -55,9 +54,8 @@ fn planes(layer: &Layer, prefix: &str) -> [Vec<f64>; 3] {
 #[track_caller]
 fn compare(ours: &[Vec<f64>; 2], theirs: &[Vec<f64>; 2], allowed: f64, what: &str) {
     let all: Vec<usize> = (0..SIZE[0] * SIZE[1]).collect();
-    let mean = |plane: &[f64], pixels: &[usize]| {
-        pixels.iter().map(|&p| plane[p]).sum::<f64>() / pixels.len() as f64
-    };
+    let mean =
+        |plane: &[f64], pixels: &[usize]| pixels.iter().map(|&p| plane[p]).sum::<f64>() / pixels.len() as f64;
     let error = |pixels: &[usize]| {
         let both = mean(&ours[1], pixels) + mean(&theirs[1], pixels);
         (both / pixels.len() as f64).sqrt()
@@ -65,7 +63,9 @@ fn compare(ours: &[Vec<f64>; 2], theirs: &[Vec<f64>; 2], allowed: f64, what: &st
     let whole = mean(&ours[0], &all);
     assert!(whole > 0.01, "{what}: the picture is black");
     assert!(error(&all) < 0.01 * whole, "{what}: {} of {whole} is too much noise", error(&all));
-    for (left, top) in (0..SIZE[0]).step_by(TILE).flat_map(|x| (0..SIZE[1]).step_by(TILE).map(move |y| (x, y))) {
+    for (left, top) in
+        (0..SIZE[0]).step_by(TILE).flat_map(|x| (0..SIZE[1]).step_by(TILE).map(move |y| (x, y)))
+    {
         let inside = |p: &usize| {
             (left..left + TILE).contains(&(p % SIZE[0])) && (top..top + TILE).contains(&(p / SIZE[0]))
         };
@@ -73,7 +73,10 @@ fn compare(ours: &[Vec<f64>; 2], theirs: &[Vec<f64>; 2], allowed: f64, what: &st
         let [a, b] = [ours, theirs].map(|planes| mean(&planes[0], &tile));
         // Dark tiles are held to a hundredth of the picture's brightness.
         let limit = 4.5 * error(&tile) + allowed * a.max(0.01 * whole);
-        assert!((a - b).abs() <= limit, "{what}, tile at {left}, {top}: {a} here, {b} there, {limit} allowed");
+        assert!(
+            (a - b).abs() <= limit,
+            "{what}, tile at {left}, {top}: {a} here, {b} there, {limit} allowed"
+        );
     }
 }
 
@@ -88,7 +91,23 @@ fn lambert_boxes_with_an_area_light_look_the_same() {
 /// Also a camera that mirrors, whose pixels lie half a pixel off, and surfaces that are black from behind.
 #[test]
 fn mirrors_and_glass_look_the_same() {
-    agree(&Desk::new(""), &repository("scenes/aris/config/scene/cbox.yaml"), 256, 0.02);
+    let desk = Desk::new("");
+    let source = repository("scenes/aris");
+    for entry in walkdir::WalkDir::new(&source).into_iter().map(|e| e.expect("an entry")) {
+        let copy = desk.path("aris").join(entry.path().strip_prefix(&source).expect("inside"));
+        if entry.file_type().is_dir() {
+            std::fs::create_dir_all(copy).unwrap();
+        } else {
+            std::fs::copy(entry.path(), copy).unwrap();
+        }
+    }
+    // The offset is half a pixel of the picture that the scene asks for.
+    let base = desk.path("aris/config/scene/cbox_base.yaml");
+    let text = std::fs::read_to_string(&base).unwrap();
+    let small = text.replace("width: 800\nheight: 600", "width: 48\nheight: 36");
+    assert_ne!(small, text);
+    std::fs::write(&base, small).unwrap();
+    agree(&desk, &desk.path("aris/config/scene/cbox.yaml"), 256, SAME);
 }
 
 /// A little of everything: highlights by Fresnel's equations are up to 0.02 brighter than Schlick's, the mask is cut at texels.
@@ -148,7 +167,8 @@ const BOX: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1
 fn emission_looks_the_same_through_texture_transforms_from_both_sides() {
     let desk = Desk::new("");
     let transform = json!({"offset": [0.2, -0.3], "rotation": 0.5, "scale": [2.0, 3.0]});
-    let texture = |sampler: usize| json!({"index": sampler, "extensions": {"KHR_texture_transform": transform}});
+    let texture =
+        |sampler: usize| json!({"index": sampler, "extensions": {"KHR_texture_transform": transform}});
     let unlit = |sampler: usize| {
         json!({"pbrMetallicRoughness": {"baseColorTexture": texture(sampler), "baseColorFactor": [0.9, 0.5, 1.0, 1.0]},
             "extensions": {"KHR_materials_unlit": {}}, "doubleSided": true})
@@ -180,11 +200,18 @@ fn diffuse(color: [f32; 4]) -> Value {
 
 const FLOOR: [f32; 4] = [-0.5, 0.0, 0.0, 0.866_025_4];
 
-/// A point light and a sun on a floor, seen from the side.
+/// A point light and a sun on a floor, seen from the side, and from infinitely far.
 #[test]
 fn lights_without_extent_look_the_same() {
     let desk = Desk::new("");
-    let scene = Gltf {
+    let perspective = lit_floor();
+    agree(&desk, &perspective.write(&desk), 64, SAME);
+    let orthographic = Gltf { half_height: Some(1.1), ..lit_floor() };
+    agree(&desk, &orthographic.write(&desk), 64, SAME);
+}
+
+fn lit_floor() -> Gltf {
+    Gltf {
         materials: vec![diffuse([0.8, 0.6, 0.4, 1.0])],
         nodes: vec![
             json!({"mesh": quad(0), "rotation": FLOOR, "scale": [3, 3, 3], "translation": [0, -0.5, -1]}),
@@ -196,8 +223,7 @@ fn lights_without_extent_look_the_same() {
             json!({"type": "directional", "color": [0.2, 0.6, 1], "intensity": 2}),
         ],
         ..Gltf::default()
-    };
-    agree(&desk, &scene.write(&desk), 64, SAME);
+    }
 }
 
 /// Tilted normals under a low sun: with x or y the wrong way round it would be dark where it is bright.
@@ -216,6 +242,7 @@ fn normal_maps_look_the_same() {
             json!({"rotation": [0.35, 0.3, 0, 0.887], "extensions": {"KHR_lights_punctual": {"light": 0}}}),
         ],
         lights: vec![json!({"type": "directional", "intensity": 3})],
+        ..Gltf::default()
     };
     agree(&desk, &scene.write(&desk), 64, SAME);
 }
@@ -240,6 +267,7 @@ fn opacity_looks_the_same() {
             json!({"rotation": [-0.3, 0.2, 0, 0.93], "extensions": {"KHR_lights_punctual": {"light": 0}}}),
         ],
         lights: vec![json!({"type": "directional", "intensity": 3})],
+        ..Gltf::default()
     };
     agree(&desk, &scene.write(&desk), 256, SAME);
 }
@@ -268,6 +296,51 @@ fn what_lets_light_through_looks_the_same() {
     agree(&desk, &scene.write(&desk), 1024, 0.02);
 }
 
+/// Without Mitsuba: what is lost is told, and the files are the same every time.
+#[test]
+fn what_mitsuba_has_no_place_for_is_told() {
+    let desk = Desk::new("");
+    let material = json!({
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0, "roughnessFactor": 0},
+        "emissiveFactor": [1, 1, 1], "alphaMode": "MASK", "doubleSided": true,
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.5},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 1}}
+    });
+    let spot = json!({"type": "spot", "range": 5, "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.4}});
+    let scene = Gltf {
+        materials: vec![material],
+        images: vec![png(1, 1, 4, &[200, 100, 50, 255])],
+        samplers: vec![json!({"wrapS": 33071, "wrapT": 10497})],
+        nodes: vec![json!({"mesh": quad(0)}), json!({"extensions": {"KHR_lights_punctual": {"light": 0}}})],
+        lights: vec![spot],
+        ..Gltf::default()
+    };
+    let source = scene.write(&desk);
+    let convert = |folder: &str| {
+        desk.run(["convert", source.to_str().unwrap(), "--to", "mitsuba", "-o", folder]).ends_with(0)
+    };
+    let run = convert("first");
+    for told in [
+        "a quarter: Mitsuba's is 4·(n·l)(n·v) times Burley's",
+        "outside the image both axes go on as the first does",
+        "alpha is at least 0.001",
+        "cut at the edges of texels",
+        "the front alone shines",
+        "Mitsuba's light does not end at a range",
+        "half-way it is about 1.3 times as bright",
+    ] {
+        assert!(run.stdout.contains(told), "no {told:?} in {}", run.stdout);
+    }
+    convert("again");
+    assert_eq!(desk.names("first"), ["meshes", "scene.xml", "textures"]);
+    for folder in ["", "meshes", "textures"] {
+        for file in desk.names(&format!("first/{folder}")).iter().filter(|f| f.contains('.')) {
+            let [a, b] = ["first", "again"].map(|run| desk.bytes(&format!("{run}/{folder}/{file}")));
+            assert!(a == b, "{folder}/{file}");
+        }
+    }
+}
+
 fn png(width: u32, height: u32, channels: u8, values: &[u8]) -> Vec<u8> {
     encode_texture(width, height, channels, Interleaved::U8(values)).expect("a picture")
 }
@@ -281,6 +354,8 @@ struct Gltf {
     samplers: Vec<Value>,
     nodes: Vec<Value>,
     lights: Vec<Value>,
+    /// Half the height of an orthographic camera's view.
+    half_height: Option<f64>,
 }
 
 /// The mesh of a square of a material: from -1 to 1 in x and y, facing z.
@@ -298,12 +373,12 @@ impl Gltf {
         let corner = |i: u32, bit: u32| if i >> bit & 1 == 1 { 1.0f32 } else { -1.0 };
         let corners: Vec<f32> = (0..8).flat_map(|i| [0, 1, 2].map(|bit| corner(i, bit))).collect();
         let square: [f32; 32] = [
-            -1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0,
-            0.0, 1.0, 1.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0,
+            -1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0,
+            0.0, 0.0, 1.0, 1.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0,
         ];
         let faces: [u16; 42] = [
-            0, 1, 2, 0, 2, 3, 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4,
-            6, 1, 3, 5, 3, 7, 5,
+            0, 1, 2, 0, 2, 3, 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4,
+            2, 2, 4, 6, 1, 3, 5, 3, 7, 5,
         ];
         let mut bytes: Vec<u8> = square.iter().chain(&corners).flat_map(|v| v.to_le_bytes()).collect();
         bytes.extend(faces.iter().flat_map(|v| v.to_le_bytes()));
@@ -329,23 +404,33 @@ impl Gltf {
                 [square, cube]
             })
             .collect();
-        let camera = json!({"camera": 0, "translation": [0.4, 0.5, 4], "rotation": [-0.05, 0.04, 0.02, 0.998]});
+        let camera =
+            json!({"camera": 0, "translation": [0.4, 0.5, 4], "rotation": [-0.05, 0.04, 0.02, 0.998]});
         let mut nodes = self.nodes;
         nodes.push(camera);
+        let camera = match self.half_height {
+            None => {
+                json!({"type": "perspective", "perspective": {"yfov": 0.8, "aspectRatio": 4.0 / 3.0, "znear": 0.1}})
+            }
+            Some(half) => json!({"type": "orthographic",
+                "orthographic": {"xmag": half * 4.0 / 3.0, "ymag": half, "znear": 0.1, "zfar": 100}}),
+        };
         let uri = |kind: &str, bytes: &[u8]| format!("data:{kind};base64,{}", base64(bytes));
-        let textures: Vec<Value> = (0..self.samplers.len()).map(|s| json!({"source": 0, "sampler": s})).collect();
-        let images: Vec<Value> = self.images.iter().map(|png| json!({"uri": uri("image/png", png)})).collect();
+        let textures: Vec<Value> =
+            (0..self.samplers.len()).map(|s| json!({"source": 0, "sampler": s})).collect();
+        let images: Vec<Value> =
+            self.images.iter().map(|png| json!({"uri": uri("image/png", png)})).collect();
         let mut document = json!({
             "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": (0..nodes.len()).collect::<Vec<_>>()}],
             "nodes": nodes, "meshes": meshes, "materials": self.materials, "accessors": accessors,
-            "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "aspectRatio": 1.333_333_3, "znear": 0.1}}],
+            "cameras": [camera],
             "bufferViews": [
                 {"buffer": 0, "byteOffset": 0, "byteLength": 128, "byteStride": 32},
                 {"buffer": 0, "byteOffset": 128, "byteLength": 96},
                 {"buffer": 0, "byteOffset": 224, "byteLength": 84},
             ],
             "buffers": [{"byteLength": bytes.len(), "uri": uri("application/octet-stream", &bytes)}],
-            "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_specular", "KHR_materials_transmission",
+            "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_clearcoat", "KHR_materials_specular", "KHR_materials_transmission",
                 "KHR_materials_unlit", "KHR_materials_volume", "KHR_texture_transform"],
             "extensions": {"KHR_lights_punctual": {"lights": self.lights}},
         });

@@ -100,3 +100,29 @@ fn reach(scene: &Scene<Material>, camera: &Camera) -> f32 {
     let farthest = (low - eye).abs().max((high - eye).abs()).length();
     if farthest.is_finite() && farthest > 0.0 { farthest } else { 1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn scaled_and_mirrored_cameras_have_unit_axes_and_sheared_ones_none() {
+        let straight = Camera::look_at(Vec3::new(3.0, 1.0, 2.0), Vec3::ZERO, Vec3::Y, 0.5);
+        let transformed = |by: Mat3A| {
+            let mut camera = straight.clone();
+            camera.world_from_camera.matrix3 *= by;
+            axes_and_scale(&camera)
+        };
+        let diagonal = |x, y, z| Mat3A::from_diagonal(Vec3::new(x, y, z));
+        let (axes, scale) = transformed(diagonal(-2.0, 2.0, 2.0)).unwrap();
+        assert!((scale - 2.0).abs() < 1e-5);
+        let expected = straight.world_from_camera.matrix3 * diagonal(-1.0, 1.0, 1.0);
+        assert!(axes.abs_diff_eq(expected, 1e-5), "{axes} {expected}");
+        let sheared = Mat3A::from_cols(Vec3A::X, Vec3A::new(0.3, 1.0, 0.0), Vec3A::Z);
+        for wrong in [diagonal(1.0, 2.0, 1.0), sheared, Mat3A::ZERO, diagonal(f32::NAN, 1.0, 1.0)] {
+            assert!(transformed(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -97,12 +97,10 @@ fn complete(scene: &mut Scene<Material>) -> Vec<Told> {
     told
 }
 
-/// Depth counts scattering in our settings, and vertices here. Roulette begins at the same vertex. The integrator for media also lets
-/// shadow rays pass what is partly there, as ours do.
+/// Depth counts scattering in our settings, and vertices here. Roulette begins at the same vertex.
 fn integrator(scene: &Scene<Material>) -> Element {
-    let is_open =
-        |material: &Material| !told::is_opaque(material) || material::absorption(material).is_some();
-    let kind = if scene.materials.iter().any(|m| is_open(&m.item)) { "volpath" } else { "path" };
+    let has_media = scene.materials.iter().any(|m| material::absorption(&m.item).is_some());
+    let kind = if has_media { "volpath" } else { "path" };
     Element::plugin("integrator", kind)
         .integer("max_depth", RenderSettings::default().max_depth.saturating_add(1))
         .integer("rr_depth", 5)

@@ -195,3 +195,31 @@ fn in_space(transform: Affine2) -> Affine3A {
         translation: axis(transform.translation),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imagefile::{Samples, decode_texture};
+
+    fn encoded(values: Vec<u8>, channels: u8, reading: Reading) -> (Samples, [u32; 2]) {
+        let image = Image { name: "a.png".into(), width: 1, height: 1, channels, pixels: Pixels::U8(values) };
+        let bytes = encode(&image, Encoding::Srgb, reading).unwrap();
+        let decoded = decode_texture(&bytes, "a").unwrap();
+        (decoded.samples, [decoded.width, decoded.height])
+    }
+
+    #[test]
+    fn bytes_stay_bytes_where_nothing_is_worked_in_and_single_pixels_are_doubled() {
+        let white = Reading::Color(Rgb::WHITE, Power::One);
+        let (samples, size) = encoded(vec![1, 2, 3], 3, white);
+        assert_eq!((samples, size), (Samples::U8([1, 2, 3].repeat(4)), [2, 2]));
+        let (alpha, _) = encoded(vec![1, 2, 3, 77], 4, Reading::Scalar(TextureChannel::A, 1.0));
+        assert_eq!(alpha, Samples::U8(vec![77; 4]));
+        let (halved, _) = encoded(vec![255, 0, 255], 3, Reading::Color(Rgb::grey(0.5), Power::Square));
+        assert_eq!(halved, Samples::F32([0.25, 0.0, 0.25].repeat(4)));
+        let (cut, _) = encoded(vec![9, 9, 9, 128], 4, Reading::Cut(TextureChannel::A, 1.0, 0.5));
+        assert_eq!(cut, Samples::F32(vec![1.0; 4]));
+        let (normal, _) = encoded(vec![255, 0, 255], 3, Reading::Normal(0.5));
+        assert_eq!(normal, Samples::F32([0.75, 0.25, 1.0].repeat(4)));
+    }
+}

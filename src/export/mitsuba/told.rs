@@ -188,7 +188,12 @@ impl Notes<'_> {
             }
             (Sides::Both, false) => self.tell("emission", Approximated, "the front alone shines"),
         }
-        self.tell_if(!is_opaque(m), "emission", Approximated, "what is cut out shines too");
+        self.tell_if(
+            !is_opaque(m),
+            "emission",
+            Approximated,
+            "what is cut out lights other surfaces too; and where there is a medium in the scene, it is seen",
+        );
     }
 }
 
