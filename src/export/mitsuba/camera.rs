@@ -1,6 +1,6 @@
 //! The camera, with film, filter and sampler.
 
-use glam::{Affine3A, Mat3A, Vec3A};
+use glam::{Affine3A, Mat3A, Vec2, Vec3A};
 
 use super::Told;
 use super::element::Element;
@@ -32,23 +32,28 @@ pub(super) fn sensor(
             Element::plugin("sensor", "orthographic").transform("to_world", place(half_width, half_width))
         }
         Projection::Perspective { fov, axis } => {
+            let offset = camera.pixel_offset;
             let sensor = match camera.lens.filter(|lens| lens.radius > 0.0) {
-                None => Element::plugin("sensor", "perspective"),
+                None => Element::plugin("sensor", "perspective")
+                    .float("principal_point_offset_x", offset.x / width as f32)
+                    .float("principal_point_offset_y", offset.y / height as f32),
                 Some(lens) => {
                     if lens.shape == Aperture::Square {
                         notes.push(("lens", Quality::Approximated, "a disk of the square's area"));
+                    }
+                    if offset != Vec2::ZERO {
+                        let reason =
+                            "with a lens Mitsuba's pixels have no offset: the picture moves by half a pixel";
+                        notes.push(("camera", Quality::Approximated, reason));
                     }
                     Element::plugin("sensor", "thinlens")
                         .float("aperture_radius", disk_radius(lens) * scale)
                         .float("focus_distance", lens.focal_distance * scale)
                 }
             };
-            let offset = camera.pixel_offset;
             sensor
                 .float("fov", fov.to_degrees())
                 .string("fov_axis", if axis == FovAxis::X { "x" } else { "y" })
-                .float("principal_point_offset_x", offset.x / width as f32)
-                .float("principal_point_offset_y", offset.y / height as f32)
                 .transform("to_world", place(1.0, 1.0))
         }
     };

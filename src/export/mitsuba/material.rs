@@ -227,7 +227,7 @@ impl Bsdfs<'_, '_> {
                 Some(mask.with(mesh_attribute("opacity", VERTEX_OPACITY)))
             }
             Param::Constant(alpha) => {
-                let alpha = opacity.cutoff.map_or(*alpha, |cutoff| f32::from(*alpha >= cutoff));
+                let alpha = constant_opacity(material).unwrap_or(*alpha);
                 (alpha < 1.0).then(|| mask.float("opacity", alpha))
             }
             Param::Texture { map, factor } => {
@@ -275,15 +275,47 @@ impl Bsdfs<'_, '_> {
         }
     }
 
-    /// What a mesh of this material shines with.
+    /// What a mesh of this material shines with. Mitsuba's masks leave emission as it is, so that it is what is there that shines.
     pub(super) fn emitter(&mut self, material: &Material) -> Option<Element> {
-        let strength = material.emission.strength;
-        let radiance = match &material.emission.color {
-            _ if !material.emits() => return None,
-            Param::Constant(color) => Param::Constant(*color * strength),
-            Param::Texture { map, factor } => Param::Texture { map: map.clone(), factor: *factor * strength },
-        };
-        Some(self.color(Element::plugin("emitter", "area"), "radiance", &radiance, Power::One))
+        if !material.emits() {
+            return None;
+        }
+        let emission = &material.emission;
+        let cover = constant_opacity(material).unwrap_or(1.0) * emission.strength;
+        let emitter = Element::plugin("emitter", "area");
+        Some(match (&emission.color, &material.opacity.alpha) {
+            (Param::Constant(color), _) => emitter.rgb("radiance", *color * cover),
+            (Param::Texture { map, factor }, Param::Texture { map: of_alpha, factor: alpha })
+                if shines_where_it_is(material) =>
+            {
+                let least = material.opacity.cutoff;
+                let reading = Reading::Shining(*factor * cover, of_alpha.channel, *alpha, least);
+                emitter.with(self.textures.element("radiance", map, reading))
+            }
+            (Param::Texture { map, factor }, _) => {
+                let reading = Reading::Color(*factor * cover, Power::One);
+                emitter.with(self.textures.element("radiance", map, reading))
+            }
+        })
+    }
+}
+
+/// The opacity, if it is the same everywhere.
+fn constant_opacity(material: &Material) -> Option<f32> {
+    let opacity = &material.opacity;
+    let alpha = opacity.alpha.constant().filter(|_| !material.vertex_alpha)?;
+    Some(opacity.cutoff.map_or(alpha.clamp(0.0, 1.0), |cutoff| f32::from(alpha >= cutoff)))
+}
+
+/// Whether what is cut out can be taken out of the emission as well: a constant, or a texture that lies as the emission's does.
+pub(super) fn shines_where_it_is(material: &Material) -> bool {
+    match (&material.emission.color, &material.opacity.alpha) {
+        _ if constant_opacity(material).is_some() => true,
+        (Param::Texture { map: a, .. }, Param::Texture { map: b, .. }) => {
+            let place = |map: &TextureMap| (map.texture, map.uv_set, map.texture_from_uv);
+            place(a) == place(b) && !material.vertex_alpha
+        }
+        _ => false,
     }
 }
 

@@ -97,10 +97,11 @@ fn complete(scene: &mut Scene<Material>) -> Vec<Told> {
     told
 }
 
-/// Depth counts scattering in our settings, and vertices here. Roulette begins at the same vertex.
+/// Depth counts scattering in our settings, and vertices here. Roulette begins at the same vertex. The integrator for media also lets
+/// shadow rays pass what is partly there, as ours do.
 fn integrator(scene: &Scene<Material>) -> Element {
-    let has_media = scene.materials.iter().any(|m| material::absorption(&m.item).is_some());
-    let kind = if has_media { "volpath" } else { "path" };
+    let needs = |material: &Material| !told::is_opaque(material) || material::absorption(material).is_some();
+    let kind = if scene.materials.iter().any(|m| needs(&m.item)) { "volpath" } else { "path" };
     Element::plugin("integrator", kind)
         .integer("max_depth", RenderSettings::default().max_depth.saturating_add(1))
         .integer("rr_depth", 5)
@@ -132,25 +133,32 @@ fn shapes(bsdfs: &mut Bsdfs<'_, '_>, ids: &[String], files: &mut Vec<(String, Ve
         let placed = Placed::new(mesh, material::attributes(material), places);
         let medium = material::absorption(material).map(|a| material::medium(a).named("interior"));
         let emitter = bsdfs.emitter(material);
-        let mut add = |name: &str, bytes: Vec<u8>| {
-            // In lower case, since not every file system tells cases apart.
-            let file = format!("meshes/{}.ply", names.of(&name.to_lowercase()));
+        let mut add = |name: &str, bytes: Vec<u8>, bsdf: Element| {
+            let file = format!("meshes/{}.ply", names.of(&file_stem(name)));
             let shape = Element::plugin("shape", "ply")
                 .string("filename", &file)
                 .boolean("face_normals", mesh.normals.is_empty())
-                .with(Element::reference(&ids[first.material.0 as usize]))
+                .with(bsdf)
                 .with_all(medium.clone())
                 .with_all(emitter.clone());
             files.push((file, bytes));
             shapes.push(shape);
         };
-        add(&first.name, placed.front());
+        let bsdf = Element::reference(&ids[first.material.0 as usize]);
+        add(&first.name, placed.front(), bsdf.clone());
         let shines_behind = emitter.is_some() && material.emission.sides == Sides::Both;
         if shines_behind && told::can_shine_behind(material) {
-            add(&format!("{}_back", first.name), placed.back());
+            // What is partly there must not be there twice.
+            let bsdf = if told::is_opaque(material) { bsdf } else { Element::plugin("bsdf", "null") };
+            add(&format!("{}_back", first.name), placed.back(), bsdf);
         }
     }
     shapes
+}
+
+/// What of a name becomes a file's: not every file system tells cases apart or takes any length.
+fn file_stem(name: &str) -> String {
+    name.to_lowercase().chars().take(100).collect()
 }
 
 /// The instances that have triangles, those of the same mesh and material together.

@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::{Affine2, Affine3A, Mat3A, Vec3A};
 
 use super::element::Element;
+use super::file_stem;
 use crate::color::Rgb;
 use crate::export::names::Identifiers;
 use crate::imagefile::{ImageFileError, Interleaved, encode_texture};
@@ -39,6 +40,8 @@ pub(super) enum Reading {
     Scalar(TextureChannel, f32),
     /// 1 where a channel times a factor reaches the last value, else 0.
     Cut(TextureChannel, f32, f32),
+    /// Its colour times a factor, where it is there: times what [`Self::Scalar`] or, with a last value, [`Self::Cut`] say.
+    Shining(Rgb, TextureChannel, f32, Option<f32>),
     /// A tangent-space normal whose x and y are multiplied by the scale.
     Normal(f32),
 }
@@ -51,6 +54,11 @@ impl Reading {
             Self::Scalar(channel, factor) => vec![channel.of(texel) * factor],
             Self::Cut(channel, factor, least) => {
                 vec![if channel.of(texel) * factor >= least { 1.0 } else { 0.0 }]
+            }
+            Self::Shining(factor, channel, of_alpha, least) => {
+                let cover =
+                    least.map_or(Self::Scalar(channel, of_alpha), |l| Self::Cut(channel, of_alpha, l));
+                (texel.color * factor * cover.of(texel)[0]).to_array().into()
             }
             Self::Normal(scale) => {
                 let Rgb { r, g, b } = texel.color;
@@ -135,8 +143,7 @@ impl<'s> Textures<'s> {
         }
         let pixels = &self.scene.images[image.0 as usize];
         let stem = Path::new(&pixels.name).file_stem().map_or("image".into(), |s| s.to_string_lossy());
-        // In lower case, since not every file system tells cases apart.
-        let stem = self.names.of(&stem.to_lowercase());
+        let stem = self.names.of(&file_stem(&stem));
         let extension = if reading.kept_channels(pixels, encoding).is_some() { "png" } else { "exr" };
         let file = format!("textures/{stem}.{extension}");
         self.used.push(Used { image, encoding, reading, file: file.clone() });

@@ -1,6 +1,6 @@
 //! What becomes of each field of a material: exact, carried, approximated or dropped, and why.
 
-use super::material::{absorption, is_smooth_glass, maps, may, vertex_opacity};
+use super::material::{absorption, is_smooth_glass, maps, may, shines_where_it_is, vertex_opacity};
 use crate::convert::{Note, Quality};
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
 use crate::scene::material::{Material, ShadingFrame, Sides};
@@ -53,48 +53,48 @@ impl Notes<'_> {
 
     fn of_disney(&mut self) {
         let m = self.material;
-        let varies = |p: Parameter| m.scalar(p).constant().is_none();
-        let is_not = |p: Parameter, value: f32| m.scalar(p).constant() != Some(value);
-        let transmits = may(m, Parameter::SpecTrans);
-        let interface = transmits && !m.thin_walled;
-        let reason = "the same terms in principled, but dielectric highlights by Fresnel's equations for Schlick's: at ior 1.5 up to 0.02 more of the light at 60°";
-        self.tell("disney", Carried, reason);
-        self.tell_if(
-            m.masking == Masking::Remapped,
-            "masking",
-            Approximated,
-            "the roughness of G is that of the highlight",
-        );
+        let interface = may(m, Parameter::SpecTrans) && !m.thin_walled;
+        if !interface {
+            self.of_highlight();
+        }
+        let masking = "the roughness of G is that of the highlight";
+        self.tell_if(m.masking == Masking::Remapped, "masking", Approximated, masking);
         self.tell_if(m.diffuse != DiffuseModel::Burley, "diffuse", Approximated, "Burley's diffuse term");
-        let tints =
-            (may(m, Parameter::SpecularTint), may(m, Parameter::Sheen) && may(m, Parameter::SheenTint));
         let hue = "the hue is the colour over Rec. 709's luminance, not over 0.3 R + 0.6 G + 0.1 B";
-        self.tell_if(tints.0, "specular_tint", Carried, hue);
-        self.tell_if(tints.1, "sheen_tint", Carried, hue);
+        self.tell_if(may(m, Parameter::SpecularTint), "specular_tint", Carried, hue);
+        let tints_sheen = may(m, Parameter::Sheen) && may(m, Parameter::SheenTint);
+        self.tell_if(tints_sheen, "sheen_tint", Carried, hue);
         let coat = "a quarter: Mitsuba's is 4·(n·l)(n·v) times Burley's, so the same head-on, half at 45° and less beyond";
         self.tell_if(may(m, Parameter::Clearcoat), "clearcoat", Approximated, coat);
-        self.tell_if(
-            !interface && varies(Parameter::Specular),
-            "specular",
-            Approximated,
-            "the texture's mean",
-        );
-        self.tell_if(
-            !interface
-                && is_not(Parameter::Specular, 0.0)
-                && m.scalar(Parameter::Specular).constant().is_some_and(|s| s > 12.4),
-            "specular",
-            Approximated,
-            "F0 ends at 0.999",
-        );
-        self.tell_if(is_not(Parameter::F90, 1.0), "f90", Dropped, "highlights rise to 1 at grazing angles");
         self.of_grain();
         self.tell_if(absorption(m).is_some(), "absorption", Exact, "a medium inside");
-        if transmits {
+        if may(m, Parameter::SpecTrans) {
             self.of_transmission(interface);
         }
         let leaf = "blended with a sheet: highlights, sheen and coat fade by as much as the sheet lets pass";
         self.tell_if(may(m, Parameter::DiffTrans), "diff_trans", Approximated, leaf);
+    }
+
+    /// The highlight of a surface that no interface lies behind.
+    fn of_highlight(&mut self) {
+        let constant = |p: Parameter| self.material.scalar(p).constant();
+        let (specular, f90) = (constant(Parameter::Specular), constant(Parameter::F90));
+        let is_metal = constant(Parameter::Metallic) == Some(1.0);
+        let is_dull = specular == Some(0.0);
+        if is_metal || (is_dull && f90 == Some(0.0)) {
+            return self.tell("disney", Exact, "principled has the same terms");
+        }
+        if is_dull {
+            let reason = "no highlight: with specular 0 ours still rises to f90 at grazing angles";
+            return self.tell("disney", Approximated, reason);
+        }
+        let reason = "the same terms in principled, but dielectric highlights by Fresnel's equations for Schlick's: at ior 1.5 up to 0.02 more of the light at 60°";
+        self.tell("disney", Carried, reason);
+        self.tell_if(f90 != Some(1.0), "f90", Dropped, "highlights rise to 1 at grazing angles");
+        match specular {
+            None => self.tell("specular", Approximated, "the texture's mean"),
+            Some(specular) => self.tell_if(specular > 12.48, "specular", Approximated, "F0 ends at 0.999"),
+        }
     }
 
     fn of_grain(&mut self) {
@@ -124,7 +124,8 @@ impl Notes<'_> {
         );
         let is_whole = constant(Parameter::SpecTrans) == Some(1.0);
         if interface {
-            self.tell("spec_trans", Exact, "");
+            let reason = "a rough interface by the same terms";
+            self.tell("spec_trans", if is_whole { Exact } else { Carried }, reason);
             self.tell_if(!is_whole, "specular", Approximated, "one index for both: ior");
             self.tell_if(
                 !is_whole && m.transmission_color.is_some(),
@@ -155,8 +156,7 @@ impl Notes<'_> {
     fn of_surface(&mut self) {
         let m = self.material;
         if m.normal_map.is_some() {
-            let reason =
-                "as where u and v are not mirrored, and not turned where it would reflect into the surface";
+            let reason = "read as if u and v were nowhere mirrored; normals that face away are turned over, not just far enough";
             self.tell("normal_map", Carried, reason);
         }
         let textured = m.base_color.constant().is_none();
@@ -188,18 +188,13 @@ impl Notes<'_> {
             }
             (Sides::Both, false) => self.tell("emission", Approximated, "the front alone shines"),
         }
-        self.tell_if(
-            !is_opaque(m),
-            "emission",
-            Approximated,
-            "what is cut out lights other surfaces too; and where there is a medium in the scene, it is seen",
-        );
+        self.tell_if(!shines_where_it_is(m), "emission", Approximated, "what is cut out shines too");
     }
 }
 
-/// A second mesh may stand behind one that shines to both sides: nothing is seen through them.
+/// A second mesh may stand behind one that shines to both sides: what is not opaque has a clear one.
 pub(super) fn can_shine_behind(material: &Material) -> bool {
-    is_opaque(material) && !material.transmits()
+    !material.transmits()
 }
 
 /// All of it is there.
