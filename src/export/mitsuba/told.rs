@@ -188,6 +188,10 @@ impl Notes<'_> {
             }
             (Sides::Both, false) => self.tell("emission", Approximated, "the front alone shines"),
         }
+        let is_varied = !is_opaque(m) && m.emission.color.constant().is_none() && shines_where_it_is(m);
+        let reason =
+            "seen as it is, but what Mitsuba has it throw on others was up to 1.2 times as much in a test";
+        self.tell_if(is_varied, "emission", Approximated, reason);
         self.tell_if(!shines_where_it_is(m), "emission", Approximated, "what is cut out shines too");
     }
 }
