@@ -1,8 +1,9 @@
 //! Scenes into what people edit and other programs read: material libraries and MaterialX documents with
-//! their textures, and Aris config roots.
+//! their textures, Aris config roots, and scenes of Mitsuba.
 
 mod aris;
 mod batch;
+mod mitsuba;
 mod mtlx;
 mod names;
 mod report;
@@ -65,9 +66,11 @@ pub enum Target {
     Mtlx,
     /// An Aris config root with its meshes.
     Aris,
+    /// A scene of Mitsuba 3 with its meshes and textures.
+    Mitsuba,
 }
 
-named_variants! { Target { Library "library", Mtlx "mtlx", Aris "aris", } }
+named_variants! { Target { Library "library", Mtlx "mtlx", Aris "aris", Mitsuba "mitsuba", } }
 
 /// A scene's file that was converted.
 #[derive(Debug)]
@@ -100,42 +103,51 @@ pub fn export(
     let imported = import(source, import_options)?;
     let converted = to_disney(imported.scene, convert_options);
     let scene = &converted.scene;
+    let materials = scene.materials.len();
     let mut notes = converted.notes;
     let name = source.file_name().unwrap_or_default().to_string_lossy();
     let mut textures = TextureFiles::new(scene);
+    let mut baked = 0;
     let (files, main) = match target {
         Target::Library => {
             let written = library::write(scene, &name);
             textures = written.textures;
-            (vec![(library::FILE_NAME.to_owned(), written.text)], library::FILE_NAME)
+            (vec![(library::FILE_NAME.to_owned(), written.text.into_bytes())], library::FILE_NAME)
         }
         Target::Mtlx => {
             let document = mtlx::document(scene, &mut textures).map_err(ExportError::Xml)?;
             notes.extend(document.notes);
-            (vec![(mtlx::FILE_NAME.to_owned(), document.text)], mtlx::FILE_NAME)
+            (vec![(mtlx::FILE_NAME.to_owned(), document.text.into_bytes())], mtlx::FILE_NAME)
         }
         Target::Aris => {
             let stem = name.split('.').next().unwrap_or_default();
             let root = aris::root(scene, stem)?;
             notes.extend(root.notes);
-            (root.files, aris::MAIN)
+            let files = root.files.into_iter().map(|(file, text)| (file, text.into_bytes()));
+            (files.collect(), aris::MAIN)
+        }
+        Target::Mitsuba => {
+            let description = mitsuba::description(scene.clone())?;
+            notes.extend(description.notes);
+            baked = description.textures;
+            (description.files, mitsuba::MAIN)
         }
     };
     // What names others comes last: where it stands, they do.
     textures.save(folder)?;
-    for (file, text) in &files {
-        write_in_folder(&folder.join(file), text)?;
+    for (file, bytes) in &files {
+        write_in_folder(&folder.join(file), bytes)?;
     }
     let mut warnings = imported.warnings;
     warnings.extend(converted.warnings);
-    let (materials, textures) = (scene.materials.len(), textures.count());
+    let textures = textures.count() + baked;
     let file = folder.join(main);
     Ok(Exported { source: source.to_owned(), file, materials, textures, notes, warnings })
 }
 
 /// Writes a file, making the folders it lies in.
-fn write_in_folder(path: &Path, text: &str) -> Result<(), ExportError> {
+fn write_in_folder(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder).map_err(|cause| ExportError::File { path: folder.into(), cause })?;
-    Ok(write_whole(path, text.as_bytes())?)
+    Ok(write_whole(path, bytes)?)
 }
