@@ -1,11 +1,14 @@
 //! Scenes into what people edit and other programs read: material libraries and MaterialX documents with
-//! their textures, and Aris config roots.
+//! their textures, Aris config roots, and glTF.
 
 mod aris;
 mod batch;
+mod gltf;
 mod mtlx;
 mod names;
+mod principled;
 mod report;
+mod rounding;
 
 use std::path::{Path, PathBuf};
 
@@ -47,6 +50,22 @@ pub enum ExportError {
         /// Why not.
         why: &'static str,
     },
+    /// A GLB can't be as long as this.
+    #[error(
+        "the GLB would take {needed} bytes, but its length is a number of 32 bits: at most {limit}; convert parts of the scene instead"
+    )]
+    GlbSize {
+        /// What it would take, at least.
+        needed: u64,
+        /// The most it can.
+        limit: u64,
+    },
+    /// The result would take the place of what it is made of.
+    #[error("{} is the scene itself and would be overwritten; choose another folder", path.display())]
+    Itself {
+        /// The scene.
+        path: PathBuf,
+    },
     /// XML can't be written.
     #[error("the document could not be made: {0}")]
     Xml(std::io::Error),
@@ -65,9 +84,11 @@ pub enum Target {
     Mtlx,
     /// An Aris config root with its meshes.
     Aris,
+    /// glTF 2.0, all of the scene in one GLB.
+    Gltf,
 }
 
-named_variants! { Target { Library "library", Mtlx "mtlx", Aris "aris", } }
+named_variants! { Target { Library "library", Mtlx "mtlx", Aris "aris", Gltf "gltf", } }
 
 /// A scene's file that was converted.
 #[derive(Debug)]
@@ -78,7 +99,7 @@ pub struct Exported {
     pub file: PathBuf,
     /// How many materials it has.
     pub materials: usize,
-    /// How many textures were written beside it.
+    /// How many textures were written beside it, or in it.
     pub textures: usize,
     /// What became of each field of each material: first on the way to Disney's terms, then on that to the target's.
     pub notes: Vec<Note>,
@@ -103,39 +124,55 @@ pub fn export(
     let mut notes = converted.notes;
     let name = source.file_name().unwrap_or_default().to_string_lossy();
     let mut textures = TextureFiles::new(scene);
+    let mut inside = 0;
+    let text = |(file, text): (String, String)| (file, text.into_bytes());
     let (files, main) = match target {
         Target::Library => {
             let written = library::write(scene, &name);
             textures = written.textures;
-            (vec![(library::FILE_NAME.to_owned(), written.text)], library::FILE_NAME)
+            (vec![text((library::FILE_NAME.to_owned(), written.text))], library::FILE_NAME)
         }
         Target::Mtlx => {
             let document = mtlx::document(scene, &mut textures).map_err(ExportError::Xml)?;
             notes.extend(document.notes);
-            (vec![(mtlx::FILE_NAME.to_owned(), document.text)], mtlx::FILE_NAME)
+            (vec![text((mtlx::FILE_NAME.to_owned(), document.text))], mtlx::FILE_NAME)
         }
         Target::Aris => {
             let stem = name.split('.').next().unwrap_or_default();
             let root = aris::root(scene, stem)?;
             notes.extend(root.notes);
-            (root.files, aris::MAIN)
+            (root.files.into_iter().map(text).collect(), aris::MAIN)
+        }
+        Target::Gltf => {
+            let glb = gltf::glb(scene)?;
+            notes.extend(glb.notes);
+            inside = glb.images;
+            (vec![(gltf::FILE_NAME.to_owned(), glb.bytes)], gltf::FILE_NAME)
         }
     };
+    if is_same_file(&folder.join(main), source) {
+        return Err(ExportError::Itself { path: source.to_owned() });
+    }
     // What names others comes last: where it stands, they do.
     textures.save(folder)?;
-    for (file, text) in &files {
-        write_in_folder(&folder.join(file), text)?;
+    for (file, content) in &files {
+        write_in_folder(&folder.join(file), content)?;
     }
     let mut warnings = imported.warnings;
     warnings.extend(converted.warnings);
-    let (materials, textures) = (scene.materials.len(), textures.count());
+    let (materials, textures) = (scene.materials.len(), textures.count() + inside);
     let file = folder.join(main);
     Ok(Exported { source: source.to_owned(), file, materials, textures, notes, warnings })
 }
 
 /// Writes a file, making the folders it lies in.
-fn write_in_folder(path: &Path, text: &str) -> Result<(), ExportError> {
+fn write_in_folder(path: &Path, content: &[u8]) -> Result<(), ExportError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder).map_err(|cause| ExportError::File { path: folder.into(), cause })?;
-    Ok(write_whole(path, text.as_bytes())?)
+    Ok(write_whole(path, content)?)
+}
+
+/// Whether both names lead to one file that is there.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

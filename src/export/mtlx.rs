@@ -4,6 +4,7 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
 use super::names::Identifiers;
+use super::principled::principled;
 use crate::color::Rgb;
 use crate::convert::{Note, Quality};
 use crate::disney::{BASE_COLOR, DiffuseModel, Masking, Model, Parameter};
@@ -235,32 +236,6 @@ impl MaterialWriter<'_, '_, '_> {
             Model::Dielectric => self.note("dielectric", Quality::Exact, "specTrans 1 at roughness 0"),
         }
     }
-}
-
-/// The material in terms of the Disney model alone.
-fn principled(material: &Material) -> Material {
-    let mut flat = material.clone();
-    let mut set = |parameter, value| *flat.scalar_mut(parameter) = Param::Constant(value);
-    match material.model {
-        Model::Disney => {}
-        Model::Diffuse => {
-            set(Parameter::Specular, 0.0);
-            set(Parameter::Roughness, 1.0);
-            set(Parameter::Metallic, 0.0);
-        }
-        Model::Mirror => {
-            set(Parameter::Metallic, 1.0);
-            set(Parameter::Roughness, 0.0);
-            flat.base_color = Param::Constant(Rgb::WHITE);
-        }
-        Model::Dielectric => {
-            set(Parameter::SpecTrans, 1.0);
-            set(Parameter::Roughness, 0.0);
-            set(Parameter::Metallic, 0.0);
-            flat.base_color = Param::Constant(Rgb::WHITE);
-        }
-    }
-    flat
 }
 
 impl Input<'_> {
