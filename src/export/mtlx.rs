@@ -229,7 +229,7 @@ impl MaterialWriter<'_, '_, '_> {
                 self.note(
                     BASE_COLOR,
                     Quality::Approximated,
-                    "Burley's diffuse term of roughness 1 for Lambert's",
+                    "Burley's diffuse term of roughness 0.45 for Lambert's: the albedo is within 1.5% up to 85°",
                 );
             }
             Model::Mirror => self.note("mirror", Quality::Exact, "a white metal of roughness 0"),

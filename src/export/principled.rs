@@ -4,6 +4,9 @@ use crate::color::Rgb;
 use crate::disney::{Model, Parameter};
 use crate::scene::material::{Material, Param};
 
+/// Burley's diffuse term of this roughness has Lambert's albedo within 1.5% up to 85° (at 1 it is 4% above at 0° and 40% at 85°).
+const NEAR_LAMBERT: f32 = 0.45;
+
 /// `material` by the parameters of the Disney model alone: Lambert as a base without highlight, a mirror as white metal, a dielectric as
 /// its interface, the last two smooth.
 pub(super) fn principled(material: &Material) -> Material {
@@ -19,7 +22,7 @@ pub(super) fn principled(material: &Material) -> Material {
         Model::Diffuse => {
             set(Parameter::Specular, 0.0);
             set(Parameter::F90, 0.0);
-            set(Parameter::Roughness, 1.0);
+            set(Parameter::Roughness, NEAR_LAMBERT);
         }
         Model::Mirror => {
             set(Parameter::Metallic, 1.0);

@@ -41,13 +41,15 @@ pub(super) fn convert(
         conversion.unlit();
         return conversion.out;
     }
-    conversion.tell_model(named.item.model);
     conversion.core();
+    conversion.tell_model(named.item.model);
     lobes::convert(&mut conversion, thickness);
     conversion.emission();
     conversion.normal();
     conversion.sides();
-    conversion.tell_scalars();
+    if named.item.model == Model::Disney {
+        conversion.tell_scalars();
+    }
     conversion.out
 }
 
@@ -155,14 +157,14 @@ impl Conversion<'_> {
         self.out.double_sided = true;
     }
 
-    /// What kind of surface becomes which parameters.
+    /// How well the base is kept: what kind of surface becomes which parameters, and the Disney model's own terms.
     fn tell_model(&mut self, model: Model) {
         let (quality, reason) = match model {
-            Model::Disney => return,
+            Model::Disney => self.difference_of_base(),
             Model::Diffuse => (
                 Quality::Carried,
-                "without a highlight (specularFactor 0) glTF's diffuse term is Lambert's; read back it is Burley's of roughness 1 unless \
-                 --diffuse says otherwise",
+                "without a highlight (specularFactor 0) glTF's diffuse term is Lambert's; read back it is Burley's of roughness 0.45, whose \
+                 albedo is within 1.5% up to 85°, unless --diffuse says otherwise",
             ),
             Model::Mirror => (
                 Quality::Approximated,
@@ -170,14 +172,24 @@ impl Conversion<'_> {
             ),
             Model::Dielectric => (Quality::Exact, "transmissionFactor 1 at roughness 0, with a volume"),
         };
-        self.note(model.name(), quality, reason);
+        let field = if matches!(model, Model::Disney | Model::Diffuse) { BASE_COLOR } else { model.name() };
+        self.note(field, quality, reason);
+        if self.source.vertex_color {
+            self.note("vertex_color", quality, "COLOR_0");
+        }
+        if model == Model::Disney && self.source.masking == Masking::Remapped {
+            let reason = "glTF's G is that of the roughness itself, not of 0.5 + roughness/2";
+            self.note("masking", Quality::Approximated, reason);
+        }
     }
 
-    /// glTF's metallic-roughness model with its alpha.
-    fn core(&mut self) {
-        let color = lobes::base_color(self);
-        self.base_color(BASE_COLOR, &color);
-        let (quality, reason) = match self.source.diffuse {
+    /// The difference of the Disney model's diffuse term, where it shows, from glTF's.
+    fn difference_of_base(&self) -> (Quality, &'static str) {
+        let is_one = |p| self.scalar(p).constant() == Some(1.0);
+        if is_one(Parameter::Metallic) || is_one(Parameter::SpecTrans) {
+            return (Quality::Exact, "");
+        }
+        match self.source.diffuse {
             DiffuseModel::LambertFresnel => (
                 Quality::Exact,
                 "glTF's own diffuse term; pipeline reads it back with --diffuse lambert_fresnel",
@@ -190,17 +202,14 @@ impl Conversion<'_> {
             DiffuseModel::Lambert => {
                 (Quality::Carried, "glTF's diffuse term is Lambert's times 1 - F; read back it is Burley's")
             }
-        };
-        self.note(BASE_COLOR, quality, reason);
-        if self.source.vertex_color {
-            self.note("vertex_color", quality, "COLOR_0");
         }
+    }
+
+    /// glTF's metallic-roughness model with its alpha.
+    fn core(&mut self) {
+        let color = lobes::base_color(self);
+        self.base_color(BASE_COLOR, &color);
         self.metallic_roughness();
-        if self.source.masking == Masking::Remapped {
-            let reason = "glTF's G is that of the roughness itself, not of 0.5 + roughness/2: rough highlights are brighter at \
-                          grazing angles here, less so there";
-            self.note("masking", Quality::Approximated, reason);
-        }
     }
 
     /// `color` and the opacity in baseColorTexture and its factor.
