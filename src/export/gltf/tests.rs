@@ -257,9 +257,11 @@ fn what_gltf_can_not_say_is_told() {
     set(Parameter::Roughness, 1.0);
     let (_, notes) = write(&material);
     assert_eq!(quality(&notes, "subsurface"), Quality::Dropped);
-    for field in ["sides", "masking", "transmission_color", "ior", "specular", "anisotropic"] {
+    for field in ["masking", "transmission_color", "ior", "specular", "anisotropic"] {
         assert_eq!(quality(&notes, field), Quality::Approximated, "{field}");
     }
+    let (_, one_sided) = write(&Material { sides: Sides::Front, ..Material::default() });
+    assert_eq!(quality(&one_sided, "sides"), Quality::Approximated);
     let reason = &notes.iter().find(|n| n.field == "ior").unwrap().reason;
     assert_eq!(reason, "0.8 here, 1 when it is read back");
     let diffuse = |diffuse| quality(&write(&Material { diffuse, ..Material::default() }).1, "base_color");
