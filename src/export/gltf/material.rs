@@ -324,37 +324,36 @@ impl Conversion<'_> {
         }
     }
 
-    /// What becomes of each scalar that plays a part: which difference the models have, and what it reads back as.
+    /// What becomes of each scalar that plays a part: which difference the models have, and what it reads back as. Defaults that stay are not told.
     fn tell_scalars(&mut self) {
         let back = self.read_back();
-        let matters: Vec<Parameter> = Parameter::ALL.into_iter().filter(|&p| self.matters(p)).collect();
-        for parameter in matters {
-            let (wanted, found) = (factor_of(self.scalar(parameter)), factor_of(back.scalar(parameter)));
-            let same_kind =
-                map_of(self.scalar(parameter)).is_some() == map_of(back.scalar(parameter)).is_some();
+        let parts: Vec<Parameter> = Parameter::ALL.into_iter().filter(|&p| self.plays_a_part(p)).collect();
+        for parameter in parts {
+            let (here, there) = (self.scalar(parameter), back.scalar(parameter));
+            let (wanted, found) = (factor_of(here), factor_of(there));
+            let same_kind = map_of(here).is_some() == map_of(there).is_some();
+            let is_core = matches!(parameter, Parameter::Metallic | Parameter::Roughness);
+            let is_default = !is_core && here.constant() == Some(parameter.default());
+            let moved = same_kind && (wanted - found).abs() > 1e-5 * wanted.abs().max(1.0);
             let (quality, reason) = lobes::difference(parameter, &self.source);
-            if quality != Quality::Dropped
-                && same_kind
-                && (wanted - found).abs() > 1e-5 * wanted.abs().max(1.0)
-            {
+            if moved && quality != Quality::Dropped {
                 let reason = format!("{wanted} here, {found} when it is read back");
                 self.note(parameter.name(), Quality::Approximated, reason);
-            } else {
+            } else if !is_default {
                 self.note(parameter.name(), quality, reason);
             }
         }
     }
 
-    /// Whether a scalar changes anything.
-    fn matters(&self, parameter: Parameter) -> bool {
+    /// Whether a scalar can change anything beside the others.
+    fn plays_a_part(&self, parameter: Parameter) -> bool {
         let is = |p: Parameter| self.scalar(p).constant() != Some(0.0);
         match parameter {
-            Parameter::Metallic | Parameter::Roughness => true,
-            Parameter::SpecularTint => is(parameter) && is(Parameter::Specular),
-            Parameter::SheenTint => is(parameter) && is(Parameter::Sheen),
+            Parameter::SpecularTint => is(Parameter::Specular),
+            Parameter::SheenTint => is(Parameter::Sheen),
             Parameter::ClearcoatGloss => is(Parameter::Clearcoat),
             Parameter::Ior => self.source.transmits(),
-            _ => self.scalar(parameter).constant() != Some(parameter.default()),
+            _ => true,
         }
     }
 

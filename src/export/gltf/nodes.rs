@@ -247,8 +247,7 @@ mod tests {
     #[test]
     fn cameras_lose_scale_and_keep_mirroring() {
         let mut camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, Vec3::Y, 0.5);
-        camera.world_from_camera.matrix3 =
-            camera.world_from_camera.matrix3 * Mat3A::from_diagonal(Vec3::new(-2.0, 2.0, 2.0));
+        camera.world_from_camera.matrix3 *= Mat3A::from_diagonal(Vec3::new(-2.0, 2.0, 2.0));
         let mut told = Vec::new();
         let m = standing(&camera, &mut |field, quality, _| told.push((field.to_owned(), quality)));
         assert!((m.matrix3.determinant() + 1.0).abs() < 1e-6);
