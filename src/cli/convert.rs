@@ -11,14 +11,15 @@ use crate::convert::ConvertOptions;
 use crate::export::{self, Exported, Input, Target, export};
 use crate::import::ImportOptions;
 
-/// Convert scenes into Disney material libraries, MaterialX, Aris config roots or Mitsuba scenes, and tell what became of each field.
+/// Convert scenes into Disney material libraries, MaterialX, Aris config roots, Mitsuba scenes or glTF, and tell what became of each
+/// field.
 ///
 /// The library, materials.yaml, is for editing by hand: `pipeline render model.glb --materials materials.yaml` lays it over the scene, and
 /// unedited it gives the same picture. Textures are written beside it. A folder is converted with all scenes inside it, in parallel; a
 /// broken file does not stop the others.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  pipeline convert scenes/shaderball.glb -o outputs/shaderball_materials\n  pipeline convert model.glb --report html > report.html\n  pipeline convert model.glb --to mtlx -o model_mtlx\n  pipeline convert model.glb --to aris -o root && pipeline render root/config spp=16\n  pipeline convert model.glb --to mitsuba -o model_mitsuba && mitsuba -m scalar_rgb -D spp=256 model_mitsuba/scene.xml\n  pipeline convert assets/ -o libraries"
+    after_help = "Examples:\n  pipeline convert scenes/shaderball.glb -o outputs/shaderball_materials\n  pipeline convert model.glb --report html > report.html\n  pipeline convert model.glb --to mtlx -o model_mtlx\n  pipeline convert model.glb --to aris -o root && pipeline render root/config spp=16\n  pipeline convert model.glb --to mitsuba -o model_mitsuba && mitsuba -m scalar_rgb -D spp=256 model_mitsuba/scene.xml\n  pipeline convert room.obj --to gltf -o room && pipeline render room/scene.glb\n  pipeline convert assets/ -o libraries"
 )]
 pub(super) struct Arguments {
     /// Scenes, or folders of scenes.
@@ -28,7 +29,7 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// What to convert into: library, a Disney material library; mtlx, a MaterialX document of disney_principled nodes; aris, a config
-    /// root with meshes, of constants alone; mitsuba, a scene of Mitsuba 3 with meshes and textures.
+    /// root with meshes, of constants alone; mitsuba, a scene of Mitsuba 3 with meshes and textures; gltf, the whole scene in scene.glb.
     #[arg(long, value_name = "TARGET", value_parser = parse_target, default_value = "library")]
     to: Target,
     #[command(flatten)]

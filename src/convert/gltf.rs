@@ -224,7 +224,7 @@ fn make_unlit(source: &GltfMaterial, material: &mut Material, notes: &mut Notes)
 }
 
 /// F0 of a smooth interface to air: ((n-1)/(n+1))²; glTF's ior 0 stands for F = 1 everywhere.
-fn f0_of_ior(ior: f32) -> f64 {
+pub(crate) fn f0_of_ior(ior: f32) -> f64 {
     let ior = f64::from(ior);
     if ior == 0.0 { 1.0 } else { Real::sqr((ior - 1.0) / (ior + 1.0)) }
 }

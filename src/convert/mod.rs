@@ -7,6 +7,9 @@ mod tint;
 
 pub use crate::settings::{ClearcoatScale, ConvertOptions, PhongRoughness};
 
+pub(crate) use gltf::f0_of_ior;
+pub(crate) use tint::{F0_OF_SPECULAR, disney_luminance};
+
 use crate::disney::Model;
 use crate::record::Warning;
 use crate::scene::source::SourceMaterial;

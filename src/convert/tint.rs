@@ -3,10 +3,10 @@
 use crate::color::Rgb;
 
 /// F0 of Disney's `specular` 1: F0 = 0.08·specular.
-pub(super) const F0_OF_SPECULAR: f64 = 0.08;
+pub(crate) const F0_OF_SPECULAR: f64 = 0.08;
 
 /// The luminance that Disney's tint divides by: 0.3 R + 0.6 G + 0.1 B (disney.brdf).
-pub(super) fn disney_luminance(c: Rgb<f64>) -> f64 {
+pub(crate) fn disney_luminance(c: Rgb<f64>) -> f64 {
     0.3 * c.r + 0.6 * c.g + 0.1 * c.b
 }
 

@@ -6,6 +6,7 @@ use std::fmt::Write;
 
 use super::ExportError;
 use super::names::Identifiers;
+use super::rounding::reads_back_as;
 use crate::color::Rgb;
 use crate::convert::{Note, Quality};
 use crate::disney::{BASE_COLOR, DiffuseModel, Masking, Model, Parameter};
@@ -292,14 +293,7 @@ fn obj(scene: &Scene<Material>, instance: &Instance) -> String {
 
 /// The degrees that are nearest to `radians`, and where there are such, those that read back to the same bits.
 fn degrees(radians: f32) -> f32 {
-    let near = radians.to_degrees();
-    let mut candidates = vec![near];
-    let (mut below, mut above) = (near, near);
-    for _ in 0..4 {
-        (below, above) = (below.next_down(), above.next_up());
-        candidates.extend([below, above]);
-    }
-    candidates.into_iter().find(|d| d.to_radians() == radians).unwrap_or(near)
+    reads_back_as(radians, radians.to_degrees(), f32::to_radians)
 }
 
 fn rgb(c: Rgb) -> String {

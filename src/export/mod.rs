@@ -1,12 +1,16 @@
 //! Scenes into what people edit and other programs read: material libraries and MaterialX documents with
-//! their textures, Aris config roots, and scenes of Mitsuba.
+//! their textures, Aris config roots, scenes of Mitsuba, and glTF.
 
 mod aris;
+mod bake;
 mod batch;
+mod gltf;
 mod mitsuba;
 mod mtlx;
 mod names;
+mod principled;
 mod report;
+mod rounding;
 
 use std::path::{Path, PathBuf};
 
@@ -14,10 +18,13 @@ pub use batch::{Input, inputs};
 pub use report::{html, json, table};
 
 use crate::convert::{ConvertOptions, Note, to_disney};
+use crate::disney::Parameter;
 use crate::imagefile::{ImageFileError, write_whole};
 use crate::import::{ImportError, ImportOptions, import};
 use crate::library::{self, TextureFiles};
 use crate::record::Warning;
+use crate::scene::material::{Curve, TextureChannel, TextureMap};
+use crate::scene::{Material, Scene};
 
 /// Why a scene can't be converted.
 #[derive(Debug, thiserror::Error)]
@@ -48,6 +55,22 @@ pub enum ExportError {
         /// Why not.
         why: &'static str,
     },
+    /// A GLB can't be as long as this.
+    #[error(
+        "the GLB would take {needed} bytes, but its length is a number of 32 bits: at most {limit}; convert parts of the scene instead"
+    )]
+    GlbSize {
+        /// What it would take, at least.
+        needed: u64,
+        /// The most it can.
+        limit: u64,
+    },
+    /// The result would take the place of what it is made of.
+    #[error("{} is the scene itself and would be overwritten; choose another folder", path.display())]
+    Itself {
+        /// The scene.
+        path: PathBuf,
+    },
     /// XML can't be written.
     #[error("the document could not be made: {0}")]
     Xml(std::io::Error),
@@ -68,9 +91,11 @@ pub enum Target {
     Aris,
     /// A scene of Mitsuba 3 with its meshes and textures.
     Mitsuba,
+    /// glTF 2.0, all of the scene in one GLB.
+    Gltf,
 }
 
-named_variants! { Target { Library "library", Mtlx "mtlx", Aris "aris", Mitsuba "mitsuba", } }
+named_variants! { Target { Library "library", Mtlx "mtlx", Aris "aris", Mitsuba "mitsuba", Gltf "gltf", } }
 
 /// A scene's file that was converted.
 #[derive(Debug)]
@@ -81,7 +106,7 @@ pub struct Exported {
     pub file: PathBuf,
     /// How many materials it has.
     pub materials: usize,
-    /// How many textures were written beside it.
+    /// How many textures were written beside it, or in it.
     pub textures: usize,
     /// What became of each field of each material: first on the way to Disney's terms, then on that to the target's.
     pub notes: Vec<Note>,
@@ -102,52 +127,82 @@ pub fn export(
 ) -> Result<Exported, ExportError> {
     let imported = import(source, import_options)?;
     let converted = to_disney(imported.scene, convert_options);
-    let scene = &converted.scene;
-    let materials = scene.materials.len();
+    let materials = converted.scene.materials.len();
     let mut notes = converted.notes;
+    let scene = &as_read_by(target, &converted.scene, &mut notes);
     let name = source.file_name().unwrap_or_default().to_string_lossy();
     let mut textures = TextureFiles::new(scene);
-    let mut baked = 0;
+    // Images that the target writes itself.
+    let mut images = 0;
+    let text = |(file, text): (String, String)| (file, text.into_bytes());
     let (files, main) = match target {
         Target::Library => {
             let written = library::write(scene, &name);
             textures = written.textures;
-            (vec![(library::FILE_NAME.to_owned(), written.text.into_bytes())], library::FILE_NAME)
+            (vec![text((library::FILE_NAME.to_owned(), written.text))], library::FILE_NAME)
         }
         Target::Mtlx => {
             let document = mtlx::document(scene, &mut textures).map_err(ExportError::Xml)?;
             notes.extend(document.notes);
-            (vec![(mtlx::FILE_NAME.to_owned(), document.text.into_bytes())], mtlx::FILE_NAME)
+            (vec![text((mtlx::FILE_NAME.to_owned(), document.text))], mtlx::FILE_NAME)
         }
         Target::Aris => {
             let stem = name.split('.').next().unwrap_or_default();
             let root = aris::root(scene, stem)?;
             notes.extend(root.notes);
-            let files = root.files.into_iter().map(|(file, text)| (file, text.into_bytes()));
-            (files.collect(), aris::MAIN)
+            (root.files.into_iter().map(text).collect(), aris::MAIN)
         }
         Target::Mitsuba => {
             let description = mitsuba::description(scene.clone())?;
             notes.extend(description.notes);
-            baked = description.textures;
+            images = description.textures;
             (description.files, mitsuba::MAIN)
         }
+        Target::Gltf => {
+            let glb = gltf::glb(scene)?;
+            notes.extend(glb.notes);
+            images = glb.images;
+            (vec![(gltf::FILE_NAME.to_owned(), glb.bytes)], gltf::FILE_NAME)
+        }
     };
+    if is_same_file(&folder.join(main), source) {
+        return Err(ExportError::Itself { path: source.to_owned() });
+    }
     // What names others comes last: where it stands, they do.
     textures.save(folder)?;
-    for (file, bytes) in &files {
-        write_in_folder(&folder.join(file), bytes)?;
+    for (file, content) in &files {
+        write_in_folder(&folder.join(file), content)?;
     }
     let mut warnings = imported.warnings;
     warnings.extend(converted.warnings);
-    let textures = textures.count() + baked;
+    let textures = textures.count() + images;
     let file = folder.join(main);
     Ok(Exported { source: source.to_owned(), file, materials, textures, notes, warnings })
 }
 
+/// The scene with textures that the target can read. A library says all that a material has, a config root has no textures.
+fn as_read_by(target: Target, scene: &Scene<Material>, notes: &mut Vec<Note>) -> Scene<Material> {
+    let keeps_anisotropy = !matches!(target, Target::Mtlx | Target::Mitsuba);
+    let wants = |parameter: Parameter, map: &TextureMap| {
+        let is_curved = map.curve != Curve::Linear;
+        match target {
+            Target::Library | Target::Aris => false,
+            Target::Mtlx => is_curved || map.channel == TextureChannel::Y,
+            Target::Mitsuba => is_curved,
+            Target::Gltf => is_curved && parameter != Parameter::ClearcoatGloss,
+        }
+    };
+    bake::bake(scene, keeps_anisotropy, wants, notes)
+}
+
 /// Writes a file, making the folders it lies in.
-fn write_in_folder(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+fn write_in_folder(path: &Path, content: &[u8]) -> Result<(), ExportError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder).map_err(|cause| ExportError::File { path: folder.into(), cause })?;
-    Ok(write_whole(path, bytes)?)
+    Ok(write_whole(path, content)?)
+}
+
+/// Whether both names lead to one file that is there.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

@@ -179,7 +179,10 @@ fn mend_attributes(mesh: &mut Mesh, tell: &mut impl FnMut(usize, &str)) {
         mesh.tangents.clear();
         tell(bad, "tangents without a direction or a sign; the mesh's tangents are ignored");
     }
-    for t in &mut mesh.tangents {
+    // Those that are unit vectors up to rounding stay as they are, so that what was written comes back.
+    for t in
+        mesh.tangents.iter_mut().filter(|t| !is_unit(t.truncate().as_dvec3().length()) || t.w.abs() != 1.0)
+    {
         *t = t.truncate().as_dvec3().normalize().as_vec3().extend(t.w.signum());
     }
 
@@ -200,6 +203,11 @@ fn mend_attributes(mesh: &mut Mesh, tell: &mut impl FnMut(usize, &str)) {
     tell(bad, "vertex colours outside [0, 1] clamped");
 }
 
+/// Whether a length is 1 up to the rounding of floats.
+fn is_unit(length: f64) -> bool {
+    (length - 1.0).abs() <= 1e-6
+}
+
 /// Makes the normals unit vectors. How many were visibly off, and how many had no direction.
 fn mend_normals(mesh: &mut Mesh) -> (usize, usize) {
     let (mut long, mut bad) = (0, Vec::new());
@@ -207,7 +215,7 @@ fn mend_normals(mesh: &mut Mesh) -> (usize, usize) {
         let length = n.as_dvec3().length();
         if !length.is_finite() || length == 0.0 {
             bad.push(i);
-        } else if (length - 1.0).abs() > 1e-6 {
+        } else if !is_unit(length) {
             // Normals of 8 bits are off by half a percent.
             long += usize::from((length - 1.0).abs() > 0.02);
             *n = (n.as_dvec3() / length).as_vec3();

@@ -6,6 +6,7 @@ mod aris;
 mod command_line;
 mod configs;
 mod convert;
+mod convert_gltf;
 mod convert_mitsuba;
 mod determinism;
 mod diff;

@@ -269,10 +269,7 @@ impl Bsdfs<'_, '_> {
 
     /// A parameter that Mitsuba has no textures for.
     fn mean(&self, material: &Material, parameter: Parameter) -> f32 {
-        match material.scalar(parameter) {
-            Param::Constant(value) => *value,
-            Param::Texture { map, factor } => map.channel.of(&self.scene.mean_texel(map)) * factor,
-        }
+        self.scene.mean_scalar(material.scalar(parameter))
     }
 
     /// What a mesh of this material shines with. Mitsuba's masks leave emission as it is, so that it is what is there that shines.

@@ -80,7 +80,9 @@ impl Reading {
                 vec![channels - 1]
             }
             Self::Scalar(channel, factor)
-                if factor == 1.0 && channel != TextureChannel::A && encoding == Encoding::Linear =>
+                if factor == 1.0
+                    && !matches!(channel, TextureChannel::A | TextureChannel::Y)
+                    && encoding == Encoding::Linear =>
             {
                 vec![if channels < 3 { 0 } else { channel as usize }]
             }

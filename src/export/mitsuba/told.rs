@@ -155,6 +155,7 @@ impl Notes<'_> {
 
     fn of_surface(&mut self) {
         let m = self.material;
+        self.tell_if(m.culled, "culled", Dropped, "the back is there, and shaded");
         if m.normal_map.is_some() {
             let reason = "read as if u and v were nowhere mirrored; normals that face away are turned over, not just far enough";
             self.tell("normal_map", Carried, reason);
@@ -181,6 +182,7 @@ impl Notes<'_> {
         if !m.emits() {
             return;
         }
+        self.tell_if(m.emission.unlit, "unlit", Approximated, "it lights other surfaces, too");
         match (m.emission.sides, can_shine_behind(m)) {
             (Sides::Front, _) => self.tell("emission", Exact, ""),
             (Sides::Both, true) => {
