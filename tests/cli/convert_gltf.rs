@@ -212,6 +212,11 @@ fn extensions_that_can_be_inverted_come_back_to_the_same_bits() {
         plastic(
             json!({"KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.6, "diffuseTransmissionColorFactor": [0.1, 1.0, 0.2]}}),
         ),
+        plastic(json!({
+            "KHR_materials_anisotropy": {"anisotropyStrength": 0.8, "anisotropyRotation": 0.3, "anisotropyTexture": {"index": 0}},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.3, "clearcoatRoughnessTexture": {"index": 0}},
+        })),
+        json!({"name": "coloured", "extensions": {"KHR_materials_unlit": {}}}),
         json!({"name": "unlit", "extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}),
     ];
     let desk = Desk::new("");

@@ -302,8 +302,9 @@ fn opacity_looks_the_same() {
 fn emission_of_what_is_partly_there_looks_the_same() {
     let desk = Desk::new("");
     let pane = |alpha: f32| {
-        json!({"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.5, 0.2, alpha]},
-            "extensions": {"KHR_materials_unlit": {}}, "alphaMode": "BLEND"})
+        json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, alpha], "metallicFactor": 0},
+            "emissiveFactor": [0.9, 0.5, 0.2], "doubleSided": true, "alphaMode": "BLEND",
+            "extensions": {"KHR_materials_specular": {"specularFactor": 0}}})
     };
     let over_floor = Gltf {
         materials: vec![pane(0.4), diffuse([0.8, 0.8, 0.8, 1.0])],
@@ -316,6 +317,7 @@ fn emission_of_what_is_partly_there_looks_the_same() {
     agree(&desk, &over_floor.write(&desk), 256, SAME);
     let mut textured = pane(0.9);
     textured["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+    textured["emissiveTexture"] = json!({"index": 0});
     let texels = [255, 255, 255, 40, 255, 200, 255, 255, 90, 255, 255, 120, 255, 255, 255, 200];
     let alone = Gltf {
         materials: vec![textured],
