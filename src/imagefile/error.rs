@@ -70,7 +70,9 @@ pub enum ImageFileError {
         size: usize,
     },
     /// It takes too much together with the other images of its scene.
-    #[error("with {name} the scene's images take more than {limit} bytes, which is more than files of their size hold")]
+    #[error(
+        "with {name} the scene's images take more than {limit} bytes, which is more than files of their size hold"
+    )]
     TooMuchTogether {
         /// The image.
         name: String,

@@ -60,11 +60,7 @@ fn limits() -> Limits {
 }
 
 /// Checks what a file of `size` bytes declares, then decodes.
-fn finish<D: ImageDecoder>(
-    mut decoder: D,
-    size: usize,
-    name: &str,
-) -> Result<DynamicImage, ImageFileError> {
+fn finish<D: ImageDecoder>(mut decoder: D, size: usize, name: &str) -> Result<DynamicImage, ImageFileError> {
     let (width, height) = decoder.dimensions();
     let channels = decoder.color_type().channel_count();
     if u64::from(width).saturating_mul(height.into()).saturating_mul(channels.into()) > MAX_VALUES {

@@ -62,7 +62,8 @@ impl Images {
     /// If it is too much together with the others.
     pub(super) fn count(&mut self, bytes: u64, name: &str) -> Result<(), ImageFileError> {
         self.decoded = self.decoded.saturating_add(bytes);
-        let limit = FREE_DECODED.saturating_add(DECODED_PER_BYTE.saturating_mul(self.stored)).min(MAX_DECODED);
+        let limit =
+            FREE_DECODED.saturating_add(DECODED_PER_BYTE.saturating_mul(self.stored)).min(MAX_DECODED);
         match self.decoded <= limit {
             true => Ok(()),
             false => Err(ImageFileError::TooMuchTogether { name: name.into(), limit }),

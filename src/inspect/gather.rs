@@ -204,7 +204,9 @@ mod tests {
         assert_eq!(names[1], "roughness=0.1 metallic=0.5");
         assert!(gathered.subjects.iter().all(|s| s.scalar(Parameter::Sheen) == 1.0));
         assert!(gathered.subjects.iter().all(|s| s.material.masking == Masking::Remapped));
-        let many = gather(&[], &edits(&["roughness=0,.1,.2,.3,.4,.5,.6,.7,.8,.9"]), Reach::Folder, None, None).unwrap();
+        let many =
+            gather(&[], &edits(&["roughness=0,.1,.2,.3,.4,.5,.6,.7,.8,.9"]), Reach::Folder, None, None)
+                .unwrap();
         assert_eq!((many.subjects.len(), many.left_out.len()), (MOST, 2));
     }
 

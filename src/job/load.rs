@@ -113,7 +113,8 @@ fn loaded(
     warnings.extend(converted.warnings);
     let mut files = imported.files;
     if let Some(path) = materials {
-        let library = Library::read(path, import_options.reach)?.ok_or_else(|| JobError::NoLibrary { path: path.into() })?;
+        let library = Library::read(path, import_options.reach)?
+            .ok_or_else(|| JobError::NoLibrary { path: path.into() })?;
         let (read, noticed) = library.lay_over(&mut scene)?;
         files.extend(read);
         warnings.extend(noticed);

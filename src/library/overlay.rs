@@ -23,7 +23,8 @@ pub(super) fn lay_over(
     scene: &mut Scene<Material>,
 ) -> Result<(Vec<FileDigest>, Vec<Warning>), LibraryError> {
     let Library { entries, files } = library;
-    let mut overlay = Overlay { scene, files, images: BTreeMap::new(), decoder: Images::default(), warnings: Vec::new() };
+    let mut overlay =
+        Overlay { scene, files, images: BTreeMap::new(), decoder: Images::default(), warnings: Vec::new() };
     for entry in &entries {
         overlay.entry(entry)?;
     }

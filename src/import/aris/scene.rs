@@ -457,10 +457,8 @@ fn read_environment(
                 cause,
                 hint: String::new(),
             })?;
-            let (image, replaced) = Images::default().decode(&bytes, name).map_err(|cause| ArisError::Image {
-                place: place.clone(),
-                key: key.to_owned(),
-                cause: Box::new(cause),
+            let (image, replaced) = Images::default().decode(&bytes, name).map_err(|cause| {
+                ArisError::Image { place: place.clone(), key: key.to_owned(), cause: Box::new(cause) }
             })?;
             if !matches!(image.pixels, Pixels::F32(_)) {
                 return Err(path.mismatch(key, "an image of floats, EXR or HDR"));

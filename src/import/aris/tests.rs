@@ -16,6 +16,10 @@ const CAMERA: &str = "camera:\n  name: perspective\n  config:\n    fov: 90\n    
 const GEOMETRY: &str = "geometry:\n  name: mesh\n  config:\n    paths: [data/a.obj]\n";
 const BRDF: &str = "brdf:\n  - name: diffuse\n    config:\n      color: [0, 0.5, 1]\n";
 
+fn import(path: &Path) -> Result<Imported, ArisError> {
+    super::import(path, Reach::Folder)
+}
+
 fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in [("data/a.obj", TRIANGLE.as_bytes())].iter().chain(files) {
@@ -350,7 +354,9 @@ fn odd_overrides_never_panic() {
         let begin = ["", "spp=", "+x.y=", "scene.brdf.0.config.color=", "++scene.", "scene.camera.config="]
             [random(6)];
         let line = begin.to_owned() + &(0..length).map(|_| pieces[random(pieces.len())]).collect::<String>();
-        let Ok(config) = ArisConfig::compose(&folder.path().join("config"), &[line], Reach::Folder) else { continue };
+        let Ok(config) = ArisConfig::compose(&folder.path().join("config"), &[line], Reach::Folder) else {
+            continue;
+        };
         composed += 1;
         let _ = (config.import(), config.to_yaml(), config.provenance(), config.output_folder());
     }

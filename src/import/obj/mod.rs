@@ -61,7 +61,8 @@ pub enum ObjError {
     /// A polygon is too large.
     #[error(
         "{place}: a polygon has {corners} corners; at most {}, or {} if it is concave, are read; hint: export triangles",
-        polygon::MAX_CORNERS, polygon::MAX_CONCAVE
+        polygon::MAX_CORNERS,
+        polygon::MAX_CONCAVE
     )]
     PolygonTooLarge {
         /// The file and the line of the group's first face.
@@ -167,7 +168,9 @@ fn read_libraries(
         // One name, blanks included, or several names.
         let candidates = match maps::find(files, folder, written) {
             Ok(found) => vec![(written.as_str(), Ok(found))],
-            Err(_) => written.split_whitespace().map(|word| (word, maps::find(files, folder, word))).collect(),
+            Err(_) => {
+                written.split_whitespace().map(|word| (word, maps::find(files, folder, word))).collect()
+            }
         };
         for (written, found) in candidates {
             let found = match found {
