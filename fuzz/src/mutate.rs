@@ -129,7 +129,7 @@ fn pack(json: &Value, bin: &[u8]) -> Vec<u8> {
 /// Changes one value somewhere in `json`.
 fn edit(json: &mut Value, random: &mut Random) {
     let count = count(json);
-    let other = nth(json, &mut random.below(count)).map(|v| v.clone()).unwrap_or_default();
+    let other = nth(json, &mut random.below(count)).cloned().unwrap_or_default();
     let Some(value) = nth(json, &mut random.below(count)) else { return };
     // A small part of another place, so that files don't explode.
     let other = if other.to_string().len() < 500 { other } else { json!({}) };
