@@ -2,7 +2,6 @@
 //! scene's folder unless that is allowed.
 
 use std::io::Write;
-use std::path::Path;
 
 use serde_json::{Value, json};
 
@@ -458,5 +457,4 @@ fn pipes_and_devices_are_no_files() {
     confined(&desk, 256 << 20, &["inspect", "--eval", "/dev/zero"])
         .ends_with(2)
         .tells("bytes of rows are read");
-    assert!(Path::new("/dev/zero").exists());
 }
