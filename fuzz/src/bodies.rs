@@ -18,8 +18,11 @@ use pipeline::scene::environment::Environment;
 use pipeline::scene::{Named, framing, studio};
 use pipeline::settings::RenderSettings;
 
+/// What a target does with an input.
+pub type Body = fn(&[u8]);
+
 /// The body of each target, by name.
-pub const ALL: [(&str, fn(&[u8])); 5] =
+pub const ALL: [(&str, Body); 5] =
     [("gltf", gltf), ("obj", obj), ("aris", aris), ("manifest", manifest), ("image", image)];
 
 /// A line that begins with this begins another file, whose name follows.
