@@ -268,7 +268,7 @@ fn obj_that_goes_too_far() {
 
 #[test]
 fn yaml_that_multiplies_itself() {
-    let list = |of: &str| vec![of; 10].join(",");
+    let list = |of: &str| [of; 10].join(",");
     let laughs: String =
         (1..12).map(|i| format!("a{i}: &a{i} [{}]\n", list(&format!("*a{}", i - 1)))).collect();
     let inserted: String =
