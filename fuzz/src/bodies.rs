@@ -4,19 +4,25 @@
 //! found.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
-use pipeline::convert::ConvertOptions;
+use pipeline::color::Rgb;
+use pipeline::convert::{ConvertOptions, to_disney};
 use pipeline::imagefile;
-use pipeline::import::{ArisConfig, ImportOptions, Reach};
-use pipeline::job::{self, Build, JobError, LoadedRun, LoadedScene};
+use pipeline::import::{ArisConfig, ImportError, ImportOptions, Imported, Reach, import, import_configured};
+use pipeline::job::{self, Build, JobError, LoadedScene};
+use pipeline::library::Library;
 use pipeline::manifest::{self, Manifest};
-use pipeline::record::Job;
-use pipeline::render::{Control, Prepared, render};
+use pipeline::render::{Control, Geometry, Prepared, render};
+use pipeline::scene::environment::Environment;
+use pipeline::scene::{Named, framing, studio};
 use pipeline::settings::RenderSettings;
 
+/// What a target does with an input.
+pub type Body = fn(&[u8]);
+
 /// The body of each target, by name.
-pub const ALL: [(&str, fn(&[u8])); 5] =
+pub const ALL: [(&str, Body); 5] =
     [("gltf", gltf), ("obj", obj), ("aris", aris), ("manifest", manifest), ("image", image)];
 
 /// A line that begins with this begins another file, whose name follows.
@@ -27,40 +33,46 @@ const MAX_PLANNED: usize = 16;
 
 /// A glTF file, GLB or JSON.
 pub fn gltf(input: &[u8]) {
-    let folder = Folder::new();
-    let path = folder.write("scene.glb", input);
-    // At rest, then moved.
-    for time in [None, Some(0.5)] {
-        let options = ImportOptions { time, ..ImportOptions::default() };
-        show(job::load(&path, &options, &ConvertOptions::default(), None));
-    }
+    show(rendered("gltf", input));
 }
 
 /// An OBJ and the files behind separators, such as its library.
 pub fn obj(input: &[u8]) {
-    let folder = Folder::new();
-    let path = folder.unpack("scene.obj", input);
-    show(job::load(&path, &ImportOptions::default(), &ConvertOptions::default(), None));
+    show(rendered("obj", input));
 }
 
-/// An Aris scene or, with a `config/render.yaml` behind a separator, the overrides of a config root; `materials.yaml` is laid over the scene.
+/// An Aris scene or, with a `config/render.yaml` behind a separator, the overrides of a config root; `materials.yaml` is laid over
+/// the scene.
 pub fn aris(input: &[u8]) {
+    show(rendered("aris", input));
+}
+
+/// Reads, converts and renders the input of one of the three.
+///
+/// # Errors
+/// If it can't be read.
+pub fn rendered(target: &str, input: &[u8]) -> Result<(), JobError> {
     let folder = Folder::new();
-    let path = folder.unpack("scene.yaml", input);
-    let materials = Some(folder.0.path().join("materials.yaml")).filter(|file| file.exists());
-    let root = folder.0.path().join("config");
-    if !ArisConfig::is_root(&root) {
-        let (options, conversion) = (ImportOptions::default(), ConvertOptions::default());
-        return show(job::load(&path, &options, &conversion, materials.as_deref()));
-    }
-    let overrides = String::from_utf8_lossy(&std::fs::read(path).unwrap_or_default()).into_owned();
-    let overrides: Vec<String> = overrides.lines().map(str::to_owned).collect();
-    match ArisConfig::compose(&root, &overrides, Reach::Folder) {
-        Err(error) => assert!(!error.to_string().is_empty()),
-        Ok(config) => {
-            let _ = (config.to_yaml(), config.provenance(), config.output_folder());
-            let run = job::load_configured(&config, &ConvertOptions::default(), materials.as_deref());
-            show(run.map(|LoadedRun { loaded, .. }| loaded));
+    let options = ImportOptions::default();
+    match target {
+        "gltf" => {
+            let path = folder.write("scene.glb", input);
+            picture(import(&path, &ImportOptions { time: Some(0.5), ..options })?, None)
+        }
+        "obj" => picture(import(&folder.unpack("scene.obj", input), &options)?, None),
+        _ => {
+            let path = folder.unpack("scene.yaml", input);
+            let materials = Some(folder.0.path().join("materials.yaml")).filter(|file| file.exists());
+            let root = folder.0.path().join("config");
+            if !ArisConfig::is_root(&root) {
+                return picture(import(&path, &options)?, materials.as_deref());
+            }
+            let overrides = String::from_utf8_lossy(&std::fs::read(path).unwrap_or_default()).into_owned();
+            let overrides: Vec<String> = overrides.lines().map(str::to_owned).collect();
+            let config = ArisConfig::compose(&root, &overrides, Reach::Folder);
+            let config = config.map_err(|error| ImportError::from(Box::new(error)))?;
+            assert!(!config.to_yaml().is_empty() && !config.provenance().is_empty());
+            picture(import_configured(&config)?.imported, materials.as_deref())
         }
     }
 }
@@ -86,8 +98,7 @@ pub fn manifest(input: &[u8]) {
                 (Err(errors), _) | (_, Some(errors)) => errors,
                 (Ok(jobs), None) => {
                     for job in jobs.iter().take(MAX_PLANNED) {
-                        let planned = job::plan(job, loaded, build());
-                        assert!(planned.is_ok_and(|p| !p.identity.is_empty()) || !job.name.is_empty());
+                        show(job::plan(job, loaded, build()).map(drop));
                     }
                     return;
                 }
@@ -107,14 +118,25 @@ pub fn image(input: &[u8]) {
     }
 }
 
-/// Renders a scene that was read, or shows why there is none.
-fn show(loaded: Result<LoadedScene, JobError>) {
-    if let Err(error) = loaded.and_then(|loaded| picture(&loaded)) {
+/// Shows why there is nothing to see, if so.
+fn show(result: Result<(), JobError>) {
+    if let Err(error) = result {
         assert!(!error.to_string().is_empty());
     }
 }
 
-fn picture(loaded: &LoadedScene) -> Result<(), JobError> {
+fn picture(imported: Imported, materials: Option<&Path>) -> Result<(), JobError> {
+    let mut scene = to_disney(imported.scene, &ConvertOptions::default()).scene;
+    if let Some(library) = materials.map(|path| Library::read(path, Reach::Folder)).transpose()?.flatten() {
+        library.lay_over(&mut scene)?;
+    }
+    if scene.cameras.is_empty() {
+        let camera = framing::frame(&scene);
+        scene.cameras.push(Named::new("default", camera));
+    }
+    if !studio::is_lit(&scene) {
+        scene.environment = Some(Environment::constant(Rgb::WHITE));
+    }
     let settings = RenderSettings {
         width: Some(4),
         height: Some(3),
@@ -123,15 +145,8 @@ fn picture(loaded: &LoadedScene) -> Result<(), JobError> {
         max_depth: 4,
         ..RenderSettings::default()
     };
-    let job = Job {
-        name: "fuzz".into(),
-        scene: "scene".into(),
-        overrides: Vec::new(),
-        settings,
-        coordinates: Vec::new(),
-    };
-    let planned = job::plan(&job, loaded, build())?;
-    let prepared = Prepared::new(planned.scene, loaded.geometry.clone(), &planned.settings)?;
+    let geometry = Arc::new(Geometry::build(&scene)?);
+    let prepared = Prepared::new(Arc::new(scene), geometry, &settings)?;
     render(&prepared, &Control::default())?;
     Ok(())
 }
@@ -166,7 +181,8 @@ impl Folder {
     fn unpack(&self, first: &str, input: &[u8]) -> PathBuf {
         let (mut name, mut content) = (first.to_owned(), Vec::new());
         for line in input.split_inclusive(|&b| b == b'\n') {
-            let next = line.strip_prefix(SEPARATOR.as_bytes()).and_then(|next| std::str::from_utf8(next).ok());
+            let next =
+                line.strip_prefix(SEPARATOR.as_bytes()).and_then(|next| std::str::from_utf8(next).ok());
             match next.map(str::trim).filter(|next| is_plain(next)) {
                 None => content.extend_from_slice(line),
                 Some(next) => {
@@ -185,5 +201,6 @@ impl Folder {
 fn is_plain(name: &str) -> bool {
     let mut parts = name.split('/');
     let plain = |c: u8| c.is_ascii_alphanumeric() || b"_-.".contains(&c);
-    name.len() < 100 && parts.all(|part| !part.is_empty() && part != ".." && part != "." && part.bytes().all(plain))
+    name.len() < 100
+        && parts.all(|part| !part.is_empty() && part != ".." && part != "." && part.bytes().all(plain))
 }

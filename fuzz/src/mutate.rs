@@ -5,21 +5,74 @@ use serde_json::{Map, Value, json};
 
 /// Numbers at which things change.
 const NUMBERS: [f64; 20] = [
-    0.0, -1.0, 1.0, 2.0, 3.0, 4.0, 16.0, 255.0, 256.0, 65535.0, 65536.0, 1e6, 1e9, 2147483647.0, 4294967295.0, 1.8446744073709552e19,
-    0.5, 1e-30, 1e30, -1e300,
+    0.0,
+    -1.0,
+    1.0,
+    2.0,
+    3.0,
+    4.0,
+    16.0,
+    255.0,
+    256.0,
+    65535.0,
+    65536.0,
+    1e6,
+    1e9,
+    2147483647.0,
+    4294967295.0,
+    1.8446744073709552e19,
+    0.5,
+    1e-30,
+    1e30,
+    -1e300,
 ];
 
 /// Words that mean something in a value.
 const WORDS: [&str; 16] = [
-    "SCALAR", "VEC2", "VEC3", "VEC4", "MAT4", "MASK", "BLEND", "STEP", "CUBICSPLINE", "weights", "rotation", "spot", "t.png", "../t.png",
-    "data:image/png;base64,AAAA", "",
+    "SCALAR",
+    "VEC2",
+    "VEC3",
+    "VEC4",
+    "MAT4",
+    "MASK",
+    "BLEND",
+    "STEP",
+    "CUBICSPLINE",
+    "weights",
+    "rotation",
+    "spot",
+    "t.png",
+    "../t.png",
+    "data:image/png;base64,AAAA",
+    "",
 ];
 
 /// Keys of which a copy elsewhere means something.
 const KEYS: [&str; 24] = [
-    "extensions", "KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing", "KHR_texture_basisu",
-    "EXT_texture_webp", "KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness", "sparse", "skin", "mesh", "children", "targets", "weights", "TANGENT",
-    "TEXCOORD_0", "JOINTS_0", "WEIGHTS_0", "normalTexture", "bufferView", "byteStride", "byteOffset", "normalized", "matrix",
+    "extensions",
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "EXT_mesh_gpu_instancing",
+    "KHR_texture_basisu",
+    "EXT_texture_webp",
+    "KHR_texture_transform",
+    "KHR_materials_pbrSpecularGlossiness",
+    "sparse",
+    "skin",
+    "mesh",
+    "children",
+    "targets",
+    "weights",
+    "TANGENT",
+    "TEXCOORD_0",
+    "JOINTS_0",
+    "WEIGHTS_0",
+    "normalTexture",
+    "bufferView",
+    "byteStride",
+    "byteOffset",
+    "normalized",
+    "matrix",
 ];
 
 /// Changes the `size` bytes of a GLB at the beginning of `data`, of which `max_size` may be used; the new size.
@@ -76,7 +129,7 @@ fn pack(json: &Value, bin: &[u8]) -> Vec<u8> {
 /// Changes one value somewhere in `json`.
 fn edit(json: &mut Value, random: &mut Random) {
     let count = count(json);
-    let other = nth(json, &mut random.below(count)).map(|v| v.clone()).unwrap_or_default();
+    let other = nth(json, &mut random.below(count)).cloned().unwrap_or_default();
     let Some(value) = nth(json, &mut random.below(count)) else { return };
     // A small part of another place, so that files don't explode.
     let other = if other.to_string().len() < 500 { other } else { json!({}) };
@@ -93,7 +146,11 @@ fn edit(json: &mut Value, random: &mut Random) {
                 2 => random.below(16) as f64,
                 _ => NUMBERS[random.below(NUMBERS.len())],
             };
-            *value = if new.fract() == 0.0 && (0.0..1.8e19).contains(&new) { json!(new as u64) } else { json!(new) };
+            *value = if new.fract() == 0.0 && (0.0..1.8e19).contains(&new) {
+                json!(new as u64)
+            } else {
+                json!(new)
+            };
         }
         Value::String(s) => WORDS[random.below(WORDS.len())].clone_into(s),
         Value::Bool(b) => *b = !*b,

@@ -3,6 +3,7 @@
 //! Scenes are small and manifests are written for each test; every test has a folder of its own.
 
 mod aris;
+mod bad_input;
 mod command_line;
 mod configs;
 mod convert;

@@ -116,7 +116,15 @@ fn damaged_instances_are_errors() {
         bin.accessors.push(json!({"count": 1 << 24, "componentType": 5126, "type": "VEC3"}));
         json!({"TRANSLATION": bin.accessors.len() - 1})
     });
-    assert!(matches!(error_of(&many), GltfError::TooMany { what: "instances", .. }));
+    let what = "elements in an accessor without a bufferView";
+    assert!(matches!(error_of(&many), GltfError::TooMany { what: w, .. } if w == what));
+    let again = instanced(|bin| {
+        bin.accessors.push(json!({"count": 1 << 16, "componentType": 5126, "type": "VEC3"}));
+        let accessor = bin.accessors.len() - 1;
+        json!({"TRANSLATION": accessor, "SCALE": accessor})
+    });
+    // As many may be asked for, but no more than there is to see: a scale of 0 shows nothing.
+    assert!(matches!(read("again.glb", &again), Err(ImportError::Invalid { .. })));
 }
 
 #[test]

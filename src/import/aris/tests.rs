@@ -16,6 +16,10 @@ const CAMERA: &str = "camera:\n  name: perspective\n  config:\n    fov: 90\n    
 const GEOMETRY: &str = "geometry:\n  name: mesh\n  config:\n    paths: [data/a.obj]\n";
 const BRDF: &str = "brdf:\n  - name: diffuse\n    config:\n      color: [0, 0.5, 1]\n";
 
+fn import(path: &Path) -> Result<Imported, ArisError> {
+    super::import(path, Reach::Folder)
+}
+
 fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in [("data/a.obj", TRIANGLE.as_bytes())].iter().chain(files) {
@@ -31,7 +35,7 @@ fn import_scene(text: &str, others: &[(&str, &[u8])]) -> Result<Imported, ArisEr
     let mut files = vec![("config/scene/s.yaml", text.as_bytes())];
     files.extend_from_slice(others);
     let folder = folder(&files);
-    import(&folder.path().join("config/scene/s.yaml"), Reach::default())
+    import(&folder.path().join("config/scene/s.yaml"))
 }
 
 fn error(text: &str, others: &[(&str, &[u8])]) -> String {
@@ -70,7 +74,7 @@ fn a_scene_keeps_its_camera_to_the_letter() {
 #[test]
 fn a_scene_outside_any_config_folder_is_its_own_root() {
     let folder = folder(&[("s.yaml", format!("{GEOMETRY}{BRDF}{CAMERA}").as_bytes())]);
-    assert!(import(&folder.path().join("s.yaml"), Reach::default()).is_ok());
+    assert!(import(&folder.path().join("s.yaml")).is_ok());
 }
 
 #[test]
@@ -280,7 +284,7 @@ fn damaged_scenes_never_panic() {
             }
         }
         std::fs::write(&path, &damaged).unwrap();
-        match import(&path, Reach::default()) {
+        match import(&path) {
             Ok(Imported { scene, .. }) => {
                 read += 1;
                 assert!(scene.cameras[0].item.world_from_camera.is_finite());
@@ -384,16 +388,15 @@ fn the_corpus_is_read_as_far_as_its_meshes_are_there() {
     };
     let scenes = PathBuf::from(corpus).join("aris/config/scene");
     for (name, meshes) in [("cbox", 6), ("cbox_diffuse", 6), ("bunny", 1)] {
-        let Imported { scene, warnings, .. } =
-            import(&scenes.join(format!("{name}.yaml")), Reach::default()).unwrap();
+        let Imported { scene, warnings, .. } = import(&scenes.join(format!("{name}.yaml"))).unwrap();
         assert_eq!((scene.instances.len(), scene.materials.len()), (meshes, meshes), "{name}");
         assert!(warnings.is_empty(), "{name}: {warnings:?}");
     }
-    let Imported { scene: cbox, .. } = import(&scenes.join("cbox.yaml"), Reach::default()).unwrap();
+    let Imported { scene: cbox, .. } = import(&scenes.join("cbox.yaml")).unwrap();
     assert_eq!(aris(&cbox, "sphere1").brdf, ArisBrdf::Mirror);
     assert_eq!(aris(&cbox, "light").radiance, Some(Rgb::grey(40.0)));
     for name in ["ajax", "ajax_simple", "veach", "lego"] {
-        let told = import(&scenes.join(format!("{name}.yaml")), Reach::default()).unwrap_err().to_string();
+        let told = import(&scenes.join(format!("{name}.yaml"))).unwrap_err().to_string();
         assert!(told.contains("geometry.config.paths[0]: cannot read"), "{name}: {told}");
     }
 }

@@ -10,8 +10,10 @@ use gltf::json::validation::Checked;
 use super::buffers::{Buffers, lookup};
 use super::error::GltfError;
 
-/// The most elements that may be read from a file, all accessors and every reading of them together, however small it is; and how many more for each byte in buffers.
-/// Many primitives may share one large array of vertices.
+/// The most elements that may be read from a file, all accessors and every reading of them together.
+const MAX_ELEMENTS: u64 = 1 << 31;
+/// As many however small the file is, and as many more for each byte in buffers: many primitives may share one large array of
+/// vertices.
 const FREE_ELEMENTS: u64 = 1 << 22;
 const ELEMENTS_PER_BYTE: u64 = 128;
 /// The most elements of an accessor that lies in no buffer (all zeros, apart from sparse values), however small the file is; and
@@ -108,19 +110,25 @@ impl<'a> Accessors<'a> {
     ) -> Result<Vec<T>, GltfError> {
         let name = format!("accessors[{index}]");
         let count = accessor.count.0;
-        self.charge(count)?;
+        if count > MAX_ELEMENTS {
+            return Err(GltfError::TooMany { what: "elements of accessors", limit: MAX_ELEMENTS });
+        }
         let size = component.size() * components;
         let mut elements = match accessor.buffer_view {
             Some(view) => {
                 let offset = accessor.byte_offset.unwrap_or_default().0;
                 let layout = self.layout(&name, view.value(), offset, count, component, size)?;
+                self.charge(count)?;
                 (0..layout.count).map(|i| decode(&layout, i)).collect()
             }
             None if count > self.max_zeros() => {
                 let what = "elements in an accessor without a bufferView";
                 return Err(GltfError::TooMany { what, limit: self.max_zeros() });
             }
-            None => vec![zero; count as usize],
+            None => {
+                self.charge(count)?;
+                vec![zero; count as usize]
+            }
         };
         if let Some(sparse) = &accessor.sparse {
             let name = format!("{name}.sparse");
@@ -216,6 +224,7 @@ impl<'a> Accessors<'a> {
     fn charge(&self, elements: u64) -> Result<(), GltfError> {
         self.read.set(self.read.get().saturating_add(elements));
         let limit = FREE_ELEMENTS.saturating_add(ELEMENTS_PER_BYTE.saturating_mul(self.buffers.stored()));
+        let limit = limit.min(MAX_ELEMENTS);
         if self.read.get() > limit {
             return Err(GltfError::TooMany { what: "elements of accessors", limit });
         }
