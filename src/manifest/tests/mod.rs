@@ -366,7 +366,7 @@ fail = -1
     10 | path = "materials.ball.sheen"
        |        ^^^^^^^^^^^^^^^^^^^^^^
        |
-       = help: did you mean `material`? paths begin with `material`, `camera`, `light`, `environment`, `render`, `scene`
+       = help: did you mean `material`? paths begin with `material`, `camera`, `light`, `environment`, `render`, `import`, `convert`, `scene`
 
     error: [[axis]] has no key `rnage`
       --> configs/test.toml:11:1
