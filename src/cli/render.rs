@@ -123,7 +123,8 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     }
     let (mut import_options, mut convert_options) =
         (arguments.reading.options(), arguments.conversion.options());
-    edit::choose(&mut import_options, &mut convert_options, &arguments.set)?;
+    edit::choose(&mut import_options, &mut convert_options, &arguments.set)
+        .map_err(|error| with_hint(error.into()))?;
     let materials = arguments.materials.as_deref();
     let run = match &config {
         Some(config) => job::load_configured(config, &convert_options, materials),
