@@ -78,6 +78,19 @@ pub(crate) trait Figure {
         DB::ErrorType: 'static;
 }
 
+/// The figure as an SVG file on white; `title` is for those who don't see it.
+pub(crate) fn standalone_svg(figure: &impl Figure, title: &str) -> Result<String, ChartError> {
+    let (width, height) = figure.size();
+    let element = svg(figure, title)?;
+    let start = element.find('>').map_or(0, |at| at + 1);
+    let head = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" {}",
+        &element["<svg ".len()..start]
+    );
+    let ground = "\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>";
+    Ok(format!("{head}{ground}{}", &element[start..]))
+}
+
 /// The figure as an SVG element without background, for a page that says how wide it is; `title` is for those who don't see it.
 pub(crate) fn svg(figure: &impl Figure, title: &str) -> Result<String, ChartError> {
     let (width, height) = fine(figure.size());
