@@ -29,7 +29,7 @@
 //! | floor | modules |
 //! |---|---|
 //! | 8 | [`cli`] |
-//! | 7 | [`check`], [`inspect`] |
+//! | 7 | [`bench`], [`check`], [`inspect`] |
 //! | 6 | [`sweep`] |
 //! | 5 | [`job`], [`report`], [`export`] |
 //! | 4 | [`render`], [`compare`], [`output`], [`library`] |
@@ -42,6 +42,7 @@
 mod named;
 
 pub mod accel;
+pub mod bench;
 pub mod check;
 pub mod cli;
 pub mod color;

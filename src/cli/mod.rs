@@ -2,6 +2,7 @@
 //! result is printed: data to stdout, talk to stderr.
 
 mod accept;
+mod bench;
 mod completions;
 mod convert;
 mod diff;
@@ -62,6 +63,7 @@ enum Command {
     Render(render::Arguments),
     Sweep(sweep::Arguments),
     Convert(convert::Arguments),
+    Bench(bench::Arguments),
     Accept(accept::Arguments),
     Diff(diff::Arguments),
     Inspect(inspect::Arguments),
@@ -100,6 +102,7 @@ fn run(arguments: &Arguments) -> Outcome {
         Command::Render(command) => render::run(command, talk),
         Command::Sweep(command) => sweep::run(command, talk),
         Command::Convert(command) => convert::run(command, talk),
+        Command::Bench(command) => bench::run(command, talk),
         Command::Accept(command) => accept::run(command, talk),
         Command::Diff(command) => diff::run(command, talk),
         Command::Inspect(command) => inspect::run(command, talk),

@@ -21,18 +21,18 @@ mod subject;
 
 use std::path::PathBuf;
 
-pub use chart::ChartError;
 pub use edit::Edit;
 pub use gather::{Gathered, MOST, Target, gather};
 pub use numbers::numbers;
 pub use quadrature::Integrals;
 pub use report::{Inspected, Options, look, write_report};
-pub use sphere::Picture;
 pub use subject::{ParameterRow, Subject};
 
 use crate::import::ImportError;
 use crate::library::LibraryError;
 use crate::manifest::edit::EditError;
+pub use crate::report::ChartError;
+pub use crate::report::chart::Picture;
 
 /// Why materials can't be looked into.
 #[derive(Debug, thiserror::Error)]

@@ -3,14 +3,15 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::chart::{self, Albedo, Density, Heat, Polar, PolarPanel, color};
+use super::chart::{Albedo, Density, Heat, Polar, PolarPanel};
 use super::measure::{Curve, Estimate, Measurements, measure};
-use super::sphere::{Picture, lit_sphere};
+use super::sphere::lit_sphere;
 use super::{InspectError, Subject, page};
 use crate::disney::Lobe;
 use crate::imagefile::{encode_png, write_whole};
 use crate::manifest::names::plain_name;
 use crate::render::Control;
+use crate::report::chart::{self, Picture, color};
 
 /// How the sphere is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

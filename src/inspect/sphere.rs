@@ -8,6 +8,7 @@ use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 use crate::color::Rgb;
 use crate::math::Real;
 use crate::render::{Control, Geometry, Prepared, RenderError, render};
+use crate::report::chart::Picture;
 use crate::scene::material::{Param, TextureChannel, TextureMap};
 use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
 use crate::scene::{
@@ -25,17 +26,6 @@ const FLOOR: f32 = 60.0;
 const SQUARES: [u8; 2] = [150, 95];
 /// The exposure of the pictures, in stops.
 const EXPOSURE: f32 = 0.2;
-
-/// An 8-bit sRGB picture, three bytes a pixel.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// R, G, B row by row.
-    pub rgb: Vec<u8>,
-}
 
 /// Renders a ball of `material` as a square picture of `size` pixels.
 ///

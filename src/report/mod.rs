@@ -5,6 +5,7 @@
 //! the terminal and [`html`] the page of the browser.
 
 mod canvas;
+pub(crate) mod chart;
 mod draw;
 pub(crate) mod font;
 mod layout;
@@ -17,6 +18,7 @@ mod sheet;
 mod table;
 
 pub use canvas::Area;
+pub use chart::ChartError;
 pub use draw::{draw_linear, draw_png, picture_area};
 pub use font::FontError;
 pub use page::{PageError, PageInput, PageJob, SheetFile, html};

@@ -13,6 +13,7 @@ use crate::record::JobRecord;
 pub use open::{Sweep, open};
 pub use present::Presentation;
 pub use run::{Observer, Options, Shard, Silent, check, run};
+pub use scenes::{Reading, Scenes};
 
 /// What a sweep came to.
 #[derive(Debug)]

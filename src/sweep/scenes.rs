@@ -11,14 +11,16 @@ use crate::record::Job;
 
 /// A scene's file and how it is read: what jobs share that need the same scene.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Reading {
-    pub(super) path: PathBuf,
+pub struct Reading {
+    /// The file.
+    pub path: PathBuf,
     import: ImportOptions,
     convert: ConvertOptions,
 }
 
 /// Loaded scenes: only the last one is kept, since jobs come scene by scene, but every failure.
-pub(super) struct Scenes {
+#[derive(Debug)]
+pub struct Scenes {
     /// The library that is laid over each.
     materials: Option<PathBuf>,
     import: ImportOptions,
@@ -27,7 +29,8 @@ pub(super) struct Scenes {
 }
 
 impl Scenes {
-    pub(super) fn of(sweep: &Sweep) -> Self {
+    /// None loaded yet, of a manifest's sweep.
+    pub fn of(sweep: &Sweep) -> Self {
         let materials = sweep.manifest.materials.as_ref().map(|file| sweep.manifest.folder().join(file));
         let import = ImportOptions { reach: sweep.reach, ..ImportOptions::default() };
         Self { materials, import, last: None, failed: Vec::new() }
@@ -37,7 +40,7 @@ impl Scenes {
     ///
     /// # Errors
     /// If an override doesn't suit its path.
-    pub(super) fn reading(&self, job: &Job) -> Result<Reading, edit::EditError> {
+    pub fn reading(&self, job: &Job) -> Result<Reading, edit::EditError> {
         let (path, import) = (job.scene.clone(), self.import.clone());
         let mut reading = Reading { path, import, convert: ConvertOptions::default() };
         edit::choose(&mut reading.import, &mut reading.convert, &job.overrides)?;
@@ -48,7 +51,7 @@ impl Scenes {
     ///
     /// # Errors
     /// As [`Self::reading`].
-    pub(super) fn readings(&self, jobs: &[Job]) -> Result<Vec<Reading>, edit::EditError> {
+    pub fn readings(&self, jobs: &[Job]) -> Result<Vec<Reading>, edit::EditError> {
         let mut readings: Vec<Reading> = Vec::new();
         for job in jobs {
             let reading = self.reading(job)?;
@@ -63,7 +66,7 @@ impl Scenes {
     ///
     /// # Errors
     /// As [`Self::reading`].
-    pub(super) fn scene_by_scene<'j>(
+    pub fn scene_by_scene<'j>(
         &self,
         jobs: &'j [Job],
     ) -> Result<Vec<(usize, &'j Job, Reading)>, edit::EditError> {
@@ -74,8 +77,11 @@ impl Scenes {
         Ok(ordered)
     }
 
-    /// The scene, or why it can't be loaded.
-    pub(super) fn get(&mut self, wanted: &Reading) -> Result<&LoadedScene, String> {
+    /// The scene.
+    ///
+    /// # Errors
+    /// Why it can't be loaded: again and again the same words.
+    pub fn get(&mut self, wanted: &Reading) -> Result<&LoadedScene, String> {
         if let Some((_, error)) = self.failed.iter().find(|(reading, _)| reading == wanted) {
             return Err(error.clone());
         }

@@ -4,6 +4,7 @@
 
 mod aris;
 mod bad_input;
+mod bench;
 mod command_line;
 mod configs;
 mod convert;

@@ -4,9 +4,9 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{Drawing, FAINT, FINE, Figure, INK, text_style};
 use crate::inspect::maps::{COLUMNS, Map};
 use crate::inspect::measure::View;
+use crate::report::chart::{Drawing, FAINT, FINE, Figure, INK, text_style};
 
 const WIDTH: u32 = 880;
 /// A map's columns in pixels.

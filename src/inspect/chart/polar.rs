@@ -4,8 +4,10 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{Drawing, FAINT, FINE, Figure, GRID, INK, dashes, legend, legend_height, stroke, text_style};
 use crate::inspect::measure::Curve;
+use crate::report::chart::{
+    Drawing, FAINT, FINE, Figure, GRID, INK, dashes, legend, legend_height, stroke, text_style,
+};
 
 /// Width of the figure in pixels: two panels.
 const WIDTH: u32 = 880;

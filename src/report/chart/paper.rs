@@ -8,7 +8,7 @@ use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
 };
 
-use crate::inspect::sphere::Picture;
+use super::Picture;
 use crate::report::font::{Fonts, Style, Weight};
 
 /// 8-bit sRGB pixels, white at first. Colours mix as codes.

@@ -1,0 +1,75 @@
+//! The runs and their summaries as text.
+
+use super::{Bench, BenchError, Summary};
+
+/// All runs, a row each.
+///
+/// # Errors
+/// If the table can't be written.
+pub fn csv(benches: &[Bench]) -> Result<String, BenchError> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let header = ["scene", "samples", "seed", "seconds", "rays", "error", "error_without_tail", "bias"];
+    writer.write_record(header)?;
+    for bench in benches {
+        for run in &bench.runs {
+            let d = run.deviation;
+            let numbers = [run.seconds.to_string(), run.rays.to_string()];
+            let errors = [d.error, d.without_tail, d.bias].map(|v| v.to_string());
+            let row = [bench.name.clone(), run.samples.to_string(), run.seed.to_string()];
+            writer.write_record(row.into_iter().chain(numbers).chain(errors))?;
+        }
+    }
+    let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// The summaries in columns.
+pub fn table(rows: &[(&str, Summary)]) -> String {
+    let heads = ["scene", "slope", "work", "s to 0.01", "bias", "tail"];
+    let cells: Vec<[String; 6]> = rows
+        .iter()
+        .map(|(name, s)| {
+            let bias = match s.bias.half_width.is_finite() {
+                true => format!("{:+.3} ± {:.3}%", 100.0 * s.bias.value, 100.0 * s.bias.half_width),
+                false => format!("{:+.3}%", 100.0 * s.bias.value),
+            };
+            [
+                (*name).to_owned(),
+                s.slope.map_or("-".into(), |slope| format!("{slope:.2}")),
+                digits(s.work),
+                digits(s.seconds_to_goal),
+                bias,
+                format!("{:.0}%", 100.0 * s.tail),
+            ]
+        })
+        .collect();
+    let width = |column: usize| {
+        let of_cells = cells.iter().map(|row| row[column].chars().count());
+        of_cells.chain([heads[column].len()]).max().unwrap_or(0)
+    };
+    let line = |row: &[&str]| {
+        let mut text = format!("{:<w$}", row[0], w = width(0));
+        for (column, cell) in row.iter().enumerate().skip(1) {
+            text.push_str(&format!("  {cell:>w$}", w = width(column)));
+        }
+        text.trim_end().to_owned() + "\n"
+    };
+    let mut text = line(&heads);
+    for row in &cells {
+        text.push_str(&line(&row.each_ref().map(String::as_str)));
+    }
+    text
+}
+
+/// Three significant digits.
+fn digits(value: f64) -> String {
+    let decimals = match value.abs() {
+        v if v >= 100.0 => 0,
+        v if v >= 10.0 => 1,
+        v if v >= 1.0 => 2,
+        v if v >= 0.1 => 3,
+        v if v >= 0.01 => 4,
+        _ => 5,
+    };
+    format!("{value:.decimals$}")
+}
