@@ -99,9 +99,12 @@ fn bias(runs: &[&Run], reference: u32) -> Interval {
 /// The two-sided 95% quantile of Student's distribution.
 fn student_95(degrees: usize) -> f64 {
     const FIRST: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
-    // Cornish and Fisher's expansion about the normal quantile z: z + (z³ + z)/4n, within 0.4% from 11 on.
+    // Cornish and Fisher's expansion about the normal quantile z: z + (z³ + z)/4n + (5z⁵ + 16z³ + 3z)/96n², within 0.2% from 11 on.
     const Z: f64 = 1.959_964;
-    FIRST.get(degrees - 1).copied().unwrap_or_else(|| Z + (Z * Z * Z + Z) / (4.0 * degrees as f64))
+    const FIRST_ORDER: f64 = (Z * Z * Z + Z) / 4.0;
+    const SECOND_ORDER: f64 = (5.0 * Z * Z * Z * Z * Z + 16.0 * Z * Z * Z + 3.0 * Z) / 96.0;
+    let n = degrees as f64;
+    FIRST.get(degrees - 1).copied().unwrap_or_else(|| Z + FIRST_ORDER / n + SECOND_ORDER / (n * n))
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -157,7 +160,7 @@ mod tests {
     #[test]
     fn quantiles_meet_the_tables() {
         for (degrees, tabulated) in [(1, 12.706), (10, 2.228), (11, 2.201), (30, 2.042), (1000, 1.962)] {
-            assert!((student_95(degrees) / tabulated - 1.0).abs() < 4e-3, "{degrees}");
+            assert!((student_95(degrees) / tabulated - 1.0).abs() < 2e-3, "{degrees}");
         }
     }
 }
