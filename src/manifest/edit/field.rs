@@ -2,6 +2,15 @@
 
 use crate::disney::Parameter;
 
+/// One of the enumerations below.
+pub(super) trait Field: Sized {
+    /// The names in paths.
+    const NAMES: &'static [&'static str];
+
+    /// The field of that name.
+    fn of_name(name: &str) -> Option<Self>;
+}
+
 /// An enumeration of fields with their names in paths and what each takes.
 macro_rules! fields {
     ($(#[$doc:meta])* $type:ident { $($variant:ident $name:literal: $expects:literal,)* }) => {
@@ -28,6 +37,14 @@ macro_rules! fields {
             /// The field of that name.
             pub fn from_name(name: &str) -> Option<Self> {
                 Self::ALL.iter().copied().find(|f| f.name() == name)
+            }
+        }
+
+        impl Field for $type {
+            const NAMES: &'static [&'static str] = &[$($name,)*];
+
+            fn of_name(name: &str) -> Option<Self> {
+                Self::from_name(name)
             }
         }
     };

@@ -2,7 +2,7 @@
 
 use super::error::EditError;
 use super::field::{
-    CameraField, ConvertField, EnvironmentField, ImportField, LightField, MaterialField, RenderField,
+    CameraField, ConvertField, EnvironmentField, Field, ImportField, LightField, MaterialField, RenderField,
 };
 use crate::manifest::nearest::nearest;
 
@@ -49,52 +49,19 @@ impl Target {
         match root {
             "material" => {
                 let (name, field) = name_and_field(path, rest, "material.NAME.FIELD")?;
-                let known = || MaterialField::ALL.iter().map(|f| f.name());
-                let field =
-                    MaterialField::from_name(field).ok_or_else(|| unknown("a material", field, known()))?;
-                Ok(Self::Material(name, field))
+                Ok(Self::Material(name, known("a material", field)?))
             }
             "light" => {
                 let (name, field) = name_and_field(path, rest, "light.NAME.FIELD")?;
-                let known = || LightField::ALL.iter().map(|f| f.name());
-                let field = LightField::from_name(field).ok_or_else(|| unknown("a light", field, known()))?;
-                Ok(Self::Light(name, field))
+                Ok(Self::Light(name, known("a light", field)?))
             }
-            "camera" => {
-                let field = only_field(path, rest, "camera.FIELD")?;
-                let known = || CameraField::ALL.iter().map(|f| f.name());
-                let field =
-                    CameraField::from_name(field).ok_or_else(|| unknown("the camera", field, known()))?;
-                Ok(Self::Camera(field))
-            }
+            "camera" => known("the camera", only_field(path, rest, "camera.FIELD")?).map(Self::Camera),
             "environment" => {
-                let field = only_field(path, rest, "environment.FIELD")?;
-                let known = || EnvironmentField::ALL.iter().map(|f| f.name());
-                let field = EnvironmentField::from_name(field)
-                    .ok_or_else(|| unknown("the environment", field, known()))?;
-                Ok(Self::Environment(field))
+                known("the environment", only_field(path, rest, "environment.FIELD")?).map(Self::Environment)
             }
-            "render" => {
-                let field = only_field(path, rest, "render.FIELD")?;
-                let known = || RenderField::ALL.iter().map(|f| f.name());
-                let field =
-                    RenderField::from_name(field).ok_or_else(|| unknown("the render", field, known()))?;
-                Ok(Self::Render(field))
-            }
-            "import" => {
-                let field = only_field(path, rest, "import.FIELD")?;
-                let known = || ImportField::ALL.iter().map(|f| f.name());
-                let field =
-                    ImportField::from_name(field).ok_or_else(|| unknown("the import", field, known()))?;
-                Ok(Self::Import(field))
-            }
-            "convert" => {
-                let field = only_field(path, rest, "convert.FIELD")?;
-                let known = || ConvertField::ALL.iter().map(|f| f.name());
-                let field = ConvertField::from_name(field)
-                    .ok_or_else(|| unknown("the conversion", field, known()))?;
-                Ok(Self::Convert(field))
-            }
+            "render" => known("the render", only_field(path, rest, "render.FIELD")?).map(Self::Render),
+            "import" => known("the import", only_field(path, rest, "import.FIELD")?).map(Self::Import),
+            "convert" => known("the conversion", only_field(path, rest, "convert.FIELD")?).map(Self::Convert),
             "scene" if path == "scene" => Ok(Self::Scene),
             "scene" => Err(EditError::Incomplete { path: shortened(path), form: "scene" }),
             _ => Err(EditError::UnknownRoot {
@@ -124,14 +91,14 @@ fn name_and_field<'a>(
     Ok((NamePattern { text: quoted.unwrap_or(name).to_owned(), is_literal: quoted.is_some() }, field))
 }
 
-fn unknown(of: &'static str, field: &str, known: impl Iterator<Item = &'static str>) -> EditError {
-    let known: Vec<_> = known.collect();
-    EditError::UnknownField {
+/// The field of `of` that is called `name`.
+fn known<F: Field>(of: &'static str, name: &str) -> Result<F, EditError> {
+    F::of_name(name).ok_or_else(|| EditError::UnknownField {
         of,
-        field: shortened(field),
-        nearest: nearest(field, known.iter().copied()),
-        known,
-    }
+        field: shortened(name),
+        nearest: nearest(name, F::NAMES.iter().copied()),
+        known: F::NAMES.to_vec(),
+    })
 }
 
 /// Text short enough for a message.
