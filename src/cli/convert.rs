@@ -32,11 +32,11 @@ pub(super) struct Arguments {
     /// root with meshes, of constants alone; mitsuba, a scene of Mitsuba 3 with meshes and textures; gltf, the whole scene in scene.glb.
     #[arg(long, value_name = "TARGET", value_parser = parse_target, default_value = "library")]
     to: Target,
-    #[command(flatten)]
-    reading: Reading,
     /// How to tell what became of the materials, on stdout.
     #[arg(long, value_enum, default_value_t = Report::Table)]
     report: Report,
+    #[command(flatten)]
+    reading: Reading,
     #[command(flatten)]
     conversion: Conversion,
 }

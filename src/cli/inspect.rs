@@ -42,10 +42,6 @@ pub(super) struct Arguments {
     /// The roughness of the masking term G: matched (that of D) or remapped (0.5 + roughness/2); the material's own where absent.
     #[arg(long, value_name = "G", value_parser = parse_enum::<Masking>)]
     g: Option<Masking>,
-    #[command(flatten)]
-    reading: Reading,
-    #[command(flatten)]
-    conversion: Conversion,
     /// Samples a pixel of the sphere.
     #[arg(long, value_name = "N", default_value_t = Options::default().spp, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     spp: u32,
@@ -55,6 +51,10 @@ pub(super) struct Arguments {
     /// Print the figures as JSON instead of the files' names.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: Reading,
+    #[command(flatten)]
+    conversion: Conversion,
 }
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {

@@ -46,7 +46,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "config", conflicts_with_all = ["output", "pixel"])]
     cfg: Option<Shown>,
     /// Set a path of the scene, as in a manifest: material.NAME.FIELD, camera.FIELD, light.NAME.FIELD, environment.FIELD,
-    /// render.FIELD.
+    /// render.FIELD, import.FIELD, convert.FIELD.
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
     set: Vec<Override>,
     /// Samples a pixel.
@@ -73,10 +73,6 @@ pub(super) struct Arguments {
     /// The pixel filter.
     #[arg(long, value_name = "FILTER", value_parser = parse_enum::<Filter>)]
     filter: Option<Filter>,
-    #[command(flatten)]
-    reading: Reading,
-    #[command(flatten)]
-    conversion: Conversion,
     /// A material library to lay over the scene's materials, such as `pipeline convert` writes.
     #[arg(long, value_name = "FILE")]
     materials: Option<PathBuf>,
@@ -92,6 +88,10 @@ pub(super) struct Arguments {
     /// Which of the pixel's samples.
     #[arg(long, value_name = "N", requires = "pixel", default_value_t = 0)]
     sample: u32,
+    #[command(flatten)]
+    reading: Reading,
+    #[command(flatten)]
+    conversion: Conversion,
 }
 
 /// A value of an enum by its name in files.
