@@ -1,30 +1,43 @@
-//! From triangles to the tree: obvhs builds it, we lay it out for traversal.
+//! From triangles to the tree: obvhs builds a binary one, whose nodes are merged into wide ones.
 
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
-use super::triangle::Triangle;
-use super::{Bvh, Node};
+use super::block::Block;
+use super::collapse::Plan;
+use super::traverse::MOST_LEVELS;
+use super::{Bvh, Child, Kernel, Node};
+
+/// The most triangles: their indices and those of nodes leave a bit for what is what.
+const MOST_TRIANGLES: usize = (1 << 31) - 1;
+
+/// The levels of eight to one that this many triangles need, eight of them a block.
+const BALANCED_LEVELS: usize = 10;
 
 /// Why a tree could not be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// The triangle indices would not fit.
-    #[error("the scene has {count} triangles; at most {} can be rendered", u32::MAX)]
+    #[error("the scene has {count} triangles; at most {MOST_TRIANGLES} can be rendered")]
     TooManyTriangles {
         /// How many there are.
         count: usize,
     },
 }
 
-/// The tree's quality and leaf size: obvhs' slow build costs some 70 ms for 60,000 triangles and pays after a few samples.
+/// The binary tree's quality, with one triangle a leaf: which of them share a block is for the plan to say. obvhs' second round of
+/// optimisation, after its own merging of leaves, would take a third of the time and be worth 1%.
 fn parameters() -> BvhBuildParams {
-    BvhBuildParams { pre_split: false, max_prims_per_leaf: 4, ..BvhBuildParams::slow_build() }
+    BvhBuildParams {
+        pre_split: false,
+        max_prims_per_leaf: 1,
+        post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+        ..BvhBuildParams::medium_build()
+    }
 }
 
 impl Bvh {
@@ -33,53 +46,74 @@ impl Bvh {
     /// # Errors
     /// [`BuildError`] where there are too many triangles.
     pub fn build(triangles: &[[Vec3; 3]]) -> Result<Self, BuildError> {
-        if u32::try_from(triangles.len()).is_err() {
+        if triangles.len() > MOST_TRIANGLES {
             return Err(BuildError::TooManyTriangles { count: triangles.len() });
         }
-        if triangles.is_empty() {
-            return Ok(Self { nodes: Vec::new(), triangles: Vec::new(), ids: Vec::new() });
-        }
-        let boxes: Vec<Aabb> =
-            triangles.iter().map(|t| Aabb::from_points(&t.map(glam::Vec3A::from))).collect();
-        let tree = build_bvh2(&boxes, parameters(), &mut Duration::default());
-        Ok(Self {
-            nodes: layout(&tree),
-            triangles: tree.primitive_indices.iter().map(|&i| Triangle::new(triangles[i as usize])).collect(),
-            ids: tree.primitive_indices,
-        })
+        let mut layout = Layout { triangles, nodes: Vec::new(), blocks: Vec::new() };
+        let root = if triangles.is_empty() {
+            layout.block(&[])
+        } else {
+            let tree = build_bvh2(&boxes(triangles), parameters(), &mut Duration::default());
+            layout.subtree(&Plan::new(&tree, triangles), 0, 0)
+        };
+        let Layout { nodes, blocks, .. } = layout;
+        Ok(Self { root, nodes, blocks, len: triangles.len(), kernel: Kernel::detect() })
     }
 }
 
-/// Inner nodes with their children's boxes, the root first.
-fn layout(tree: &Bvh2) -> Vec<Node> {
-    // obvhs keeps a node's box in the node itself; ours holds its two children's, so leaves need no node.
-    let mut index = vec![u32::MAX; tree.nodes.len()];
-    let mut inner = 0;
-    for (i, node) in tree.nodes.iter().enumerate() {
-        if node.prim_count == 0 {
-            index[i] = inner;
-            inner += 1;
+fn boxes(triangles: &[[Vec3; 3]]) -> Vec<Aabb> {
+    triangles.iter().map(|t| Aabb::from_points(&t.map(Vec3A::from))).collect()
+}
+
+/// The wide tree as it grows.
+struct Layout<'a> {
+    triangles: &'a [[Vec3; 3]],
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+}
+
+impl Layout<'_> {
+    /// Adds what the plan makes of a binary node that has `level` wide ones above it.
+    fn subtree(&mut self, plan: &Plan<'_>, n: u32, level: usize) -> Child {
+        if let Some(triangles) = plan.leaf(n) {
+            return self.block(&triangles);
         }
+        // Thousands of boxes one in another, or in one place, make a tree thousands of levels deep.
+        if level == MOST_LEVELS - BALANCED_LEVELS {
+            return self.balanced(&plan.triangles(n));
+        }
+        let index = self.inner();
+        for (slot, n) in plan.wide_children(n).into_iter().enumerate() {
+            let child = self.subtree(plan, n, level + 1);
+            self.nodes[index].set(slot, plan.bounds(n), child);
+        }
+        Child::of_node(index)
     }
-    let child = |i: usize| {
-        let node = &tree.nodes[i];
-        let target = if node.prim_count == 0 { index[i] } else { node.first_index };
-        (Vec3::from(node.aabb.min), Vec3::from(node.aabb.max), target, node.prim_count)
-    };
-    let pair = |a: (Vec3, Vec3, u32, u32), b: (Vec3, Vec3, u32, u32)| Node {
-        min: [a.0, b.0],
-        max: [a.1, b.1],
-        child: [a.2, b.2],
-        count: [a.3, b.3],
-    };
-    if inner == 0 {
-        // A single leaf: the other child's box is empty, so that no ray enters it.
-        let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0, 0);
-        return vec![pair(child(0), nothing)];
+
+    /// Adds a tree of as few levels as there can be, keeping the order of `triangles`.
+    fn balanced(&mut self, triangles: &[u32]) -> Child {
+        if triangles.len() <= Block::ROOM {
+            return self.block(triangles);
+        }
+        let index = self.inner();
+        let share = triangles.len().div_ceil(8).next_multiple_of(Block::ROOM);
+        for (slot, part) in triangles.chunks(share).enumerate() {
+            let corners = part.iter().flat_map(|&t| self.triangles[t as usize]);
+            let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+            let bounds = corners.fold(none, |(low, high), p| (low.min(p), high.max(p)));
+            let child = self.balanced(part);
+            self.nodes[index].set(slot, bounds, child);
+        }
+        Child::of_node(index)
     }
-    tree.nodes
-        .iter()
-        .filter(|node| node.prim_count == 0)
-        .map(|node| pair(child(node.first_index as usize), child(node.first_index as usize + 1)))
-        .collect()
+
+    fn inner(&mut self) -> usize {
+        self.nodes.push(Node::empty());
+        self.nodes.len() - 1
+    }
+
+    fn block(&mut self, triangles: &[u32]) -> Child {
+        self.blocks.push(Block::new(triangles.iter().map(|&t| (t, self.triangles[t as usize]))));
+        Child::of_block(self.blocks.len() - 1)
+    }
 }

@@ -18,7 +18,8 @@ pub struct Build {
     pub executable: Hash,
     /// The crate's version.
     pub version: &'static str,
-    /// The processor features that the code was compiled for: results are the same bits within a level.
+    /// The processor features that the code was compiled for: results are the same bits within a level. What [`crate::accel`]
+    /// chooses by the running processor finds the same bits everywhere, so that it doesn't count.
     pub feature_level: &'static str,
 }
 

@@ -1,0 +1,136 @@
+//! A leaf: up to eight triangles, tested at once.
+//!
+//! # Ties
+//!
+//! A hit's ray parameter is never less than where the ray enters the box around its triangle, computed as for the boxes of the
+//! tree; larger boxes are entered no later, since rounding is monotonic. So a box that is entered behind the nearest hit holds
+//! nothing as near, and which of several equally near hits counts, the one of the lowest index, does not depend on the order
+//! in which boxes are visited.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+
+use super::Hit;
+use super::lanes::{Floats, Lanes};
+use super::traverse::Beam;
+use super::triangle::{UNCERTAIN, intersect};
+
+/// The index of no triangle.
+pub(super) const NOBODY: u32 = u32::MAX;
+
+/// Triangles, one a lane.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// By vertex and axis; NaN in free lanes, which no ray hits.
+    vertices: [[[f32; 8]; 3]; 3],
+    /// The triangles' indices in the input.
+    ids: [u32; 8],
+}
+
+impl Block {
+    /// How many triangles there is room for.
+    pub(super) const ROOM: usize = 8;
+
+    /// Holds the first eight of `triangles`, given with their indices.
+    pub(super) fn new(triangles: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
+        let mut block = Self { vertices: [[[f32::NAN; 8]; 3]; 3], ids: [NOBODY; 8] };
+        for (lane, (id, corners)) in triangles.into_iter().take(Self::ROOM).enumerate() {
+            for (vertex, corner) in block.vertices.iter_mut().zip(corners) {
+                for (axis, value) in vertex.iter_mut().zip(corner.to_array()) {
+                    axis[lane] = value;
+                }
+            }
+            block.ids[lane] = id;
+        }
+        block
+    }
+
+    /// The triangles with their indices.
+    pub(super) fn triangles(&self) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        let taken = self.ids.iter().take_while(|&&id| id != NOBODY);
+        taken.enumerate().map(|(lane, &id)| (id, self.corners(lane)))
+    }
+
+    fn corners(&self, lane: usize) -> [Vec3; 3] {
+        self.vertices.map(|vertex| Vec3::from_array(vertex.map(|axis| axis[lane])))
+    }
+
+    /// Calls `found` with the hits no farther than `t_max`, in the order of lanes, until it breaks.
+    #[inline(always)]
+    pub(super) fn each_hit<L: Lanes>(
+        &self,
+        lanes: L,
+        ray: &Beam<L>,
+        t_max: f32,
+        mut found: impl FnMut(Hit) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let [a, b, c] = &self.vertices;
+        let (ax, ay, az) = ray.shear(lanes, a);
+        let (bx, by, bz) = ray.shear(lanes, b);
+        let (cx, cy, cz) = ray.shear(lanes, c);
+        // Without fusing, two neighbours agree on the sign of their edge.
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+        let zero = lanes.splat(0.0);
+        let inside = zero.less(least) | most.less(zero);
+        let on_edge = least.equal(zero) | most.equal(zero);
+        if inside | on_edge == 0 {
+            return ControlFlow::Continue(());
+        }
+
+        let scale = ray.sheared_inverse[2];
+        let inverse = lanes.splat(1.0) / (u + v + w);
+        let t = (u * (scale * az) + v * (scale * bz) + w * (scale * cz)) * inverse;
+        let (x, y, z) = (largest(ax, bx, cx), largest(ay, by, cy), largest(az, bz, cz));
+        let uncertain =
+            t.abs().less(lanes.splat(UNCERTAIN) * (x * y + z * (x + y)) * (z * scale * inverse).abs());
+        let in_front = zero.less(t);
+        let t = self.entry(lanes, ray, 2).max(t);
+        let t = self.entry(lanes, ray, 0).max(self.entry(lanes, ray, 1).max(t));
+        let doubtful = on_edge | (inside & uncertain);
+        let mut candidates = doubtful | (inside & in_front & t.at_most(lanes.splat(t_max)));
+        if candidates == 0 {
+            return ControlFlow::Continue(());
+        }
+        let t = t.to_array();
+        let barycentric = [u, v, w].map(|edge| (edge * inverse).to_array());
+        while candidates != 0 {
+            let lane = candidates.trailing_zeros() as usize % 8;
+            candidates &= candidates - 1;
+            let triangle = self.ids[lane];
+            if triangle == ray.source {
+                continue;
+            }
+            let (t, barycentric) = if doubtful >> lane & 1 == 0 {
+                (t[lane], barycentric.map(|b| b[lane]))
+            } else {
+                match intersect(self.corners(lane), &ray.sheared) {
+                    Some(hit) if hit.0 <= t_max => hit,
+                    _ => continue,
+                }
+            };
+            found(Hit { t, triangle, barycentric })?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Where the ray enters the slabs around the triangles across one of the sheared axes; NaN where it runs in a face.
+    #[inline(always)]
+    fn entry<L: Lanes>(&self, lanes: L, ray: &Beam<L>, i: usize) -> L::Floats {
+        let axis = ray.sheared.axes[i];
+        let (a, b) = (lanes.load(&self.vertices[0][axis]), lanes.load(&self.vertices[1][axis]));
+        let c = lanes.load(&self.vertices[2][axis]);
+        let near = if ray.sheared.inverse[i] < 0.0 { a.max(b).max(c) } else { a.min(b).min(c) };
+        (near - ray.sheared_origin[i]) * ray.sheared_inverse[i]
+    }
+}
+
+/// The largest absolute value of three.
+#[inline(always)]
+fn largest<F: Floats>(a: F, b: F, c: F) -> F {
+    a.abs().max(b.abs()).max(c.abs())
+}

@@ -1,0 +1,198 @@
+//! How a ray finds its way through the tree.
+
+use std::ops::ControlFlow;
+
+use arrayvec::ArrayVec;
+
+use super::block::NOBODY;
+use super::lanes::{Floats, Lanes};
+use super::triangle::ShearedRay;
+use super::{Bvh, Child, Hit, Node, Ray};
+
+/// The levels of inner nodes that a tree may have; the build sees to it.
+pub(super) const MOST_LEVELS: usize = 26;
+
+/// Each level on the way down leaves at most seven children behind.
+const STACK: usize = 7 * MOST_LEVELS + 1;
+
+/// The far plane is moved out by this factor, so that rounding never makes a ray miss a box it grazes (Ize 2013, "Robust BVH
+/// Ray Traversal", JCGT 2:2): 1 + 2γ(3).
+const ROBUST_FAR: f32 = 1.000_000_4;
+
+/// A ray made ready for eight boxes or triangles at a time.
+pub(super) struct Beam<L: Lanes> {
+    pub(super) sheared: ShearedRay,
+    /// As in `sheared`.
+    pub(super) sheared_origin: [L::Floats; 3],
+    pub(super) shear: [L::Floats; 2],
+    pub(super) sheared_inverse: [L::Floats; 3],
+    /// The triangle that it starts on.
+    pub(super) source: u32,
+    origin: [L::Floats; 3],
+    inverse: [L::Floats; 3],
+    /// Whether it runs towards smaller coordinates.
+    backward: [bool; 3],
+}
+
+impl<L: Lanes> Beam<L> {
+    /// None for a ray that isn't finite, which hits nothing.
+    #[inline(always)]
+    fn new(lanes: L, ray: &Ray) -> Option<Self> {
+        if !(ray.origin.is_finite() && ray.direction.is_finite()) {
+            return None;
+        }
+        let sheared = ShearedRay::new(ray);
+        let inverse = ray.direction.to_array().map(|d| 1.0 / d);
+        Some(Self {
+            sheared_origin: sheared.origin.map(|v| lanes.splat(v)),
+            shear: sheared.shear.map(|v| lanes.splat(v)),
+            sheared_inverse: sheared.inverse.map(|v| lanes.splat(v)),
+            sheared,
+            source: ray.source.unwrap_or(NOBODY),
+            origin: ray.origin.to_array().map(|v| lanes.splat(v)),
+            inverse: inverse.map(|v| lanes.splat(v)),
+            backward: inverse.map(|v| v < 0.0),
+        })
+    }
+
+    /// Points in the ray's space: sheared x and y, and unscaled z.
+    #[inline(always)]
+    pub(super) fn shear(&self, lanes: L, points: &[[f32; 8]; 3]) -> (L::Floats, L::Floats, L::Floats) {
+        let [kx, ky, kz] = self.sheared.axes;
+        let [ox, oy, oz] = self.sheared_origin;
+        let z = lanes.load(&points[kz]) - oz;
+        let (x, y) = (lanes.load(&points[kx]) - ox, lanes.load(&points[ky]) - oy);
+        (x - self.shear[0] * z, y - self.shear[1] * z, z)
+    }
+}
+
+impl Node {
+    /// Where the ray enters the children, and which of them it enters before `t_max`.
+    ///
+    /// A direction component of 0 makes 0·∞ = NaN where the origin lies in the plane of a face: minimum and maximum then take
+    /// their second operand, and the slab does not cut.
+    #[inline(always)]
+    fn enter<L: Lanes>(&self, lanes: L, ray: &Beam<L>, t_max: f32) -> (L::Floats, u32) {
+        let [near_x, far_x] = self.slab(lanes, ray, 0);
+        let [near_y, far_y] = self.slab(lanes, ray, 1);
+        let [near_z, far_z] = self.slab(lanes, ray, 2);
+        let entry = near_x.max(near_y).max(near_z.max(lanes.splat(0.0)));
+        let exit = far_x.min(far_y).min(far_z) * lanes.splat(ROBUST_FAR);
+        (entry, entry.at_most(exit.min(lanes.splat(t_max))))
+    }
+
+    /// Where the ray crosses the near and the far planes across an axis.
+    #[inline(always)]
+    fn slab<L: Lanes>(&self, lanes: L, ray: &Beam<L>, axis: usize) -> [L::Floats; 2] {
+        let [lower, upper] = &self.bounds[axis];
+        let (near, far) = if ray.backward[axis] { (upper, lower) } else { (lower, upper) };
+        let (origin, inverse) = (ray.origin[axis], ray.inverse[axis]);
+        [(lanes.load(near) - origin) * inverse, (lanes.load(far) - origin) * inverse]
+    }
+}
+
+/// A child and where the ray enters it, which is never negative, so that keys sort by the entry.
+fn key(entry: f32, child: Child) -> u64 {
+    u64::from(entry.to_bits()) << 32 | u64::from(child.0)
+}
+
+/// The nearest of the hits that `counts`, among equally near ones the one of the lowest index.
+#[inline(always)]
+pub(super) fn closest<L: Lanes>(
+    lanes: L,
+    bvh: &Bvh,
+    ray: &Ray,
+    mut counts: impl FnMut(&Hit) -> bool,
+) -> Option<Hit> {
+    let beam = Beam::new(lanes, ray)?;
+    let mut nearest = None;
+    // No index is lower than 0: the ray's end itself is out of reach.
+    let (mut t_max, mut rival) = (ray.t_max, 0);
+    let mut pending = ArrayVec::<u64, STACK>::new();
+    let mut child = bvh.root;
+    loop {
+        if let Some(block) = child.block() {
+            let _ = bvh.blocks[block].each_hit(lanes, &beam, t_max, |hit| {
+                let is_nearer = hit.t < t_max || (hit.t == t_max && hit.triangle < rival);
+                if is_nearer && counts(&hit) {
+                    (t_max, rival) = (hit.t, hit.triangle);
+                    nearest = Some(hit);
+                }
+                ControlFlow::Continue(())
+            });
+        } else {
+            let node = &bvh.nodes[child.node()];
+            let (entry, mut entered) = node.enter(lanes, &beam, t_max);
+            if entered != 0 {
+                let entry = entry.to_array();
+                let mut next = || {
+                    let lane = entered.trailing_zeros() as usize % 8;
+                    entered &= entered - 1;
+                    (entered, key(entry[lane], node.child[lane]))
+                };
+                let (mut rest, mut first) = next();
+                // The nearest goes on; the others wait, the nearer on top.
+                let bottom = pending.len();
+                while rest != 0 {
+                    let (left, other) = next();
+                    rest = left;
+                    let farther = first.max(other);
+                    first = first.min(other);
+                    pending.push(farther);
+                    let mut at = pending.len() - 1;
+                    while at > bottom && pending[at - 1] < farther {
+                        pending[at] = pending[at - 1];
+                        at -= 1;
+                    }
+                    pending[at] = farther;
+                }
+                child = Child(first as u32);
+                continue;
+            }
+        }
+        // What begins behind the nearest hit is left out.
+        child = loop {
+            let Some(key) = pending.pop() else { return nearest };
+            if f32::from_bits((key >> 32) as u32) <= t_max {
+                break Child(key as u32);
+            }
+        };
+    }
+}
+
+/// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
+///
+/// Children are visited in the order that the tree keeps them: those first that most likely hide something for the least work.
+#[inline(always)]
+pub(super) fn visit<L: Lanes>(
+    lanes: L,
+    bvh: &Bvh,
+    ray: &Ray,
+    mut visitor: impl FnMut(Hit) -> ControlFlow<()>,
+) -> bool {
+    let Some(beam) = Beam::new(lanes, ray) else { return false };
+    let mut pending = ArrayVec::<Child, STACK>::new();
+    let mut child = bvh.root;
+    loop {
+        if let Some(block) = child.block() {
+            let went_through = bvh.blocks[block].each_hit(lanes, &beam, ray.t_max, |hit| {
+                if hit.t < ray.t_max { visitor(hit) } else { ControlFlow::Continue(()) }
+            });
+            if went_through.is_break() {
+                return true;
+            }
+        } else {
+            let node = &bvh.nodes[child.node()];
+            let (_, mut entered) = node.enter(lanes, &beam, ray.t_max);
+            while entered != 0 {
+                let last = 31 - entered.leading_zeros();
+                entered ^= 1 << last;
+                pending.push(node.child[last as usize % 8]);
+            }
+        }
+        match pending.pop() {
+            Some(next) => child = next,
+            None => return false,
+        }
+    }
+}
