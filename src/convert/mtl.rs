@@ -18,7 +18,7 @@ use crate::scene::source::{MtlMap, MtlMaterial, MtlSlot};
 
 /// The material `name` in Disney's terms, with a note on every statement that it holds.
 ///
-/// Lambert where `illum` is 0 or 1, or nothing but the diffuse colour is given; a smooth dielectric for glass without
+/// Lambert where `illum` is 0 or 1, `Ks` is black, or nothing but the diffuse colour is given; a smooth dielectric for glass without
 /// roughness; else the Disney model. OBJ surfaces have two sides.
 pub(super) fn convert(
     name: &str,
@@ -48,12 +48,19 @@ fn model(source: &MtlMaterial) -> Model {
     }
     let mapped = source.map(MtlSlot::Ks).is_some() || source.map(MtlSlot::Ns).is_some();
     let shiny = mapped || source.ks.is_some() || source.ns.is_some() || source.ni.is_some();
+    let dull = has_no_highlight(source);
     match source.illum {
         _ if source.is_physically_based() => Model::Disney,
         Some(0 | 1) => Model::Diffuse,
-        _ if shiny => Model::Disney,
+        _ if shiny && !dull => Model::Disney,
         _ => Model::Diffuse,
     }
+}
+
+/// Whether `Ks` is black, as exporters write it for matt surfaces. From `illum` 4 on `Ni` reflects nevertheless.
+fn has_no_highlight(source: &MtlMaterial) -> bool {
+    let black = source.ks.is_some_and(|ks| ks.max_channel() <= 0.0) && source.map(MtlSlot::Ks).is_none();
+    black && source.illum.unwrap_or(2) < 4
 }
 
 struct Conversion<'a> {

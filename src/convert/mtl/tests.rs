@@ -21,6 +21,13 @@ fn constant(material: &Material, parameter: Parameter) -> f32 {
     material.scalar(parameter).constant().unwrap()
 }
 
+/// A slot with the texture `id`.
+fn loaded(slot: MtlSlot, id: u32) -> (MtlSlot, MtlMap) {
+    let mut map = MtlMap::new("a.png", 3);
+    map.texture = Some(TextureId(id));
+    (slot, map)
+}
+
 #[test]
 fn plain_colours_are_lambert_exactly() {
     let color = Rgb::new(0.6, 0.1, 0.1);
@@ -36,6 +43,15 @@ fn plain_colours_are_lambert_exactly() {
             ..Default::default()
         },
         MtlMaterial { kd, illum: Some(2), ..Default::default() },
+        MtlMaterial {
+            kd,
+            illum: Some(2),
+            ks: Some(Rgb::BLACK),
+            ns: Some(10.0),
+            ni: Some(1.5),
+            maps: vec![loaded(MtlSlot::Ns, 1)],
+            ..Default::default()
+        },
     ] {
         let (material, notes, warnings) = converted(&source);
         assert_eq!(material.model, Model::Diffuse);
@@ -44,6 +60,17 @@ fn plain_colours_are_lambert_exactly() {
         assert!(notes.iter().all(|n| n.quality == Quality::Exact), "{notes:?}");
         assert!(warnings.is_empty());
     }
+}
+
+#[test]
+fn a_black_ks_leaves_a_highlight_to_its_map_and_to_ni() {
+    let black = MtlMaterial { ks: Some(Rgb::BLACK), ns: Some(10.0), ..Default::default() };
+    let mapped = MtlMaterial { maps: vec![loaded(MtlSlot::Ks, 1)], ..black.clone() };
+    assert_eq!(converted(&mapped).0.model, Model::Disney);
+    let (material, notes, _) = converted(&MtlMaterial { illum: Some(5), ni: Some(1.5), ..black });
+    assert_eq!(material.model, Model::Disney);
+    assert!((constant(&material, Parameter::Specular) - 0.5).abs() < 1e-6);
+    assert_eq!(quality(&notes, "Ks"), Some(Quality::Dropped), "Ni is there in its place");
 }
 
 #[test]
@@ -159,11 +186,6 @@ fn maps_multiply_and_their_options_act_on_v_upwards() {
 
 #[test]
 fn maps_of_highlights_and_coats_vary_their_parameters() {
-    let loaded = |slot, id| {
-        let mut map = MtlMap::new("a.png", 3);
-        map.texture = Some(TextureId(id));
-        (slot, map)
-    };
     let source = MtlMaterial {
         ks: Some(Rgb::grey(0.5)),
         ns: Some(100.0),
