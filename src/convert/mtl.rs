@@ -15,6 +15,10 @@ use crate::record::Warning;
 use crate::scene::Material;
 use crate::scene::material::{NormalMap, Param, Sides, TextureChannel, TextureMap};
 use crate::scene::source::{MtlMap, MtlMaterial, MtlSlot};
+use crate::scene::texture::Wrap;
+
+/// What a scalar reads of a colour image unless `-imfchan` says otherwise (the specification's default, `l`).
+const SCALAR: TextureChannel = TextureChannel::Y;
 
 /// The material `name` in Disney's terms, with a note on every statement that it holds.
 ///
@@ -111,6 +115,10 @@ impl Conversion<'_> {
             self.note(slot.statement(), Quality::Dropped, format!("{:?} could not be loaded", map.file));
             return None;
         };
+        if map.wrap == Wrap::Clamp {
+            let reason = "its edge goes on beyond the image, where MTL shows the material without it";
+            self.note(&format!("{} -clamp", slot.statement()), Quality::Approximated, reason);
+        }
         let channel = map.channel.unwrap_or(channel);
         Some(TextureMap { texture_from_uv: texture_from_uv(map), ..TextureMap::new(texture, channel) })
     }
@@ -182,7 +190,7 @@ impl Conversion<'_> {
     fn opacity(&mut self) {
         let channel = match self.source.map(MtlSlot::D) {
             Some(map) if map.has_alpha => TextureChannel::A,
-            _ => TextureChannel::R,
+            _ => SCALAR,
         };
         let alpha = match (self.source.d, self.source.tr) {
             (Some(d), tr) => {

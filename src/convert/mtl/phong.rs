@@ -1,6 +1,6 @@
 //! MTL's Phong terms: `Ks`, `Ns` and `Ni` with their maps.
 
-use super::Conversion;
+use super::{Conversion, SCALAR};
 use crate::color::Rgb;
 use crate::convert::tint::fit_tint;
 use crate::convert::{PhongRoughness, Quality};
@@ -93,7 +93,7 @@ impl Conversion<'_> {
             }
             return;
         }
-        let map = self.map(MtlSlot::Ns, TextureChannel::R);
+        let map = self.map(MtlSlot::Ns, SCALAR);
         match self.options.phong {
             PhongRoughness::Walter => self.exponent_by_walter(map),
             PhongRoughness::Blender => self.exponent_by_blender(map),

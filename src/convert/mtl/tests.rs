@@ -74,6 +74,14 @@ fn a_black_ks_leaves_a_highlight_to_its_map_and_to_ni() {
 }
 
 #[test]
+fn clamped_maps_tell_what_is_beyond_them() {
+    let (slot, mut map) = loaded(MtlSlot::Kd, 1);
+    map.wrap = Wrap::Clamp;
+    let (_, notes, _) = converted(&MtlMaterial { maps: vec![(slot, map)], ..Default::default() });
+    assert_eq!(quality(&notes, "map_Kd -clamp"), Some(Quality::Approximated));
+}
+
+#[test]
 fn phong_becomes_specular_and_roughness() {
     let source = MtlMaterial {
         kd: Some(Rgb::new(0.8, 0.4, 0.2)),
@@ -198,14 +206,14 @@ fn maps_of_highlights_and_coats_vary_their_parameters() {
     };
     let (material, notes, _) = converted(&source);
     assert_eq!(*material.scalar(Parameter::Specular), read(1, TextureChannel::Y, Curve::Linear, 0.5));
-    let exponent = read(2, TextureChannel::R, Curve::RoughnessOfExponent, 100.0);
+    let exponent = read(2, TextureChannel::Y, Curve::RoughnessOfExponent, 100.0);
     assert_eq!(*material.scalar(Parameter::Roughness), exponent);
     assert_eq!(quality(&notes, "map_Ks"), Some(Quality::Approximated));
     // As Blender reads them: the map is the roughness.
     let blender = ConvertOptions { phong: PhongRoughness::Blender, ..Default::default() };
     let mut notes = Vec::new();
     let material = convert("m", &source, &blender, &mut notes, &mut Vec::new());
-    assert_eq!(*material.scalar(Parameter::Roughness), read(2, TextureChannel::R, Curve::Linear, 1.0));
+    assert_eq!(*material.scalar(Parameter::Roughness), read(2, TextureChannel::Y, Curve::Linear, 1.0));
     assert_eq!(quality(&notes, "Ns"), Some(Quality::Dropped));
     let plain = MtlMaterial { maps: Vec::new(), ns: Some(250.0), ..source };
     let material = convert("m", &plain, &blender, &mut Vec::new(), &mut Vec::new());
@@ -217,8 +225,8 @@ fn maps_of_highlights_and_coats_vary_their_parameters() {
         ..Default::default()
     };
     let (material, ..) = converted(&coat);
-    assert_eq!(*material.scalar(Parameter::Clearcoat), read(3, TextureChannel::R, Curve::Linear, 1.0));
-    let gloss = read(4, TextureChannel::R, Curve::GlossOfRoughness, 1.0);
+    assert_eq!(*material.scalar(Parameter::Clearcoat), read(3, TextureChannel::Y, Curve::Linear, 1.0));
+    let gloss = read(4, TextureChannel::Y, Curve::GlossOfRoughness, 1.0);
     assert_eq!(*material.scalar(Parameter::ClearcoatGloss), gloss);
 }
 
