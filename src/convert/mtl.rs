@@ -15,10 +15,14 @@ use crate::record::Warning;
 use crate::scene::Material;
 use crate::scene::material::{NormalMap, Param, Sides, TextureChannel, TextureMap};
 use crate::scene::source::{MtlMap, MtlMaterial, MtlSlot};
+use crate::scene::texture::Wrap;
+
+/// What a scalar reads of a colour image unless `-imfchan` says otherwise (the specification's default, `l`).
+const SCALAR: TextureChannel = TextureChannel::Y;
 
 /// The material `name` in Disney's terms, with a note on every statement that it holds.
 ///
-/// Lambert where `illum` is 0 or 1, or nothing but the diffuse colour is given; a smooth dielectric for glass without
+/// Lambert where `illum` is 0 or 1, `Ks` is black, or nothing but the diffuse colour is given; a smooth dielectric for glass without
 /// roughness; else the Disney model. OBJ surfaces have two sides.
 pub(super) fn convert(
     name: &str,
@@ -48,12 +52,19 @@ fn model(source: &MtlMaterial) -> Model {
     }
     let mapped = source.map(MtlSlot::Ks).is_some() || source.map(MtlSlot::Ns).is_some();
     let shiny = mapped || source.ks.is_some() || source.ns.is_some() || source.ni.is_some();
+    let dull = has_no_highlight(source);
     match source.illum {
         _ if source.is_physically_based() => Model::Disney,
         Some(0 | 1) => Model::Diffuse,
-        _ if shiny => Model::Disney,
+        _ if shiny && !dull => Model::Disney,
         _ => Model::Diffuse,
     }
+}
+
+/// Whether `Ks` is black, as exporters write it for matt surfaces. From `illum` 4 on `Ni` reflects nevertheless.
+fn has_no_highlight(source: &MtlMaterial) -> bool {
+    let black = source.ks.is_some_and(|ks| ks.max_channel() <= 0.0) && source.map(MtlSlot::Ks).is_none();
+    black && source.illum.unwrap_or(2) < 4
 }
 
 struct Conversion<'a> {
@@ -104,6 +115,10 @@ impl Conversion<'_> {
             self.note(slot.statement(), Quality::Dropped, format!("{:?} could not be loaded", map.file));
             return None;
         };
+        if map.wrap == Wrap::Clamp {
+            let reason = "its edge goes on beyond the image, where MTL shows the material without it";
+            self.note(&format!("{} -clamp", slot.statement()), Quality::Approximated, reason);
+        }
         let channel = map.channel.unwrap_or(channel);
         Some(TextureMap { texture_from_uv: texture_from_uv(map), ..TextureMap::new(texture, channel) })
     }
@@ -175,7 +190,7 @@ impl Conversion<'_> {
     fn opacity(&mut self) {
         let channel = match self.source.map(MtlSlot::D) {
             Some(map) if map.has_alpha => TextureChannel::A,
-            _ => TextureChannel::R,
+            _ => SCALAR,
         };
         let alpha = match (self.source.d, self.source.tr) {
             (Some(d), tr) => {

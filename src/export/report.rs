@@ -37,9 +37,14 @@ fn summary(exported: &Exported) -> String {
     });
     let counts: Vec<String> = counts.collect();
     let counts = if counts.is_empty() { "nothing to tell".to_owned() } else { counts.join(", ") };
-    let (materials, textures) = (exported.materials, exported.textures);
-    let file = exported.file.display();
-    format!("{file}: {materials} materials, {textures} textures; fields: {counts}")
+    let materials = counted(exported.materials, "material");
+    let textures = counted(exported.textures, "texture");
+    format!("{}: {materials}, {textures}; fields: {counts}", exported.file.display())
+}
+
+/// A number of things, as in "1 texture" and "2 textures".
+fn counted(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Control characters of names from files would move the terminal's cursor.
@@ -109,7 +114,7 @@ mod tests {
         let text = table(&exported(), None);
         assert_eq!(text.matches("<gold>").count(), 1);
         assert!(text.contains("KHR_materials_iridescence   dropped   not read"), "{text}");
-        let counted = "out/materials.yaml: 2 materials, 1 textures; fields: 1 exact, 1 carried, 1 dropped\n";
+        let counted = "out/materials.yaml: 2 materials, 1 texture; fields: 1 exact, 1 carried, 1 dropped\n";
         assert!(text.ends_with(counted), "{text}");
     }
 
@@ -118,6 +123,7 @@ mod tests {
         let page = html(&[exported()]).unwrap();
         assert!(page.contains("&lt;gold&gt;") && !page.contains("<gold>"));
         assert!(page.contains("albedo +5%") && !page.contains("http"));
+        assert!(page.contains("2 materials, 1 texture<"));
         assert_eq!(json(&[exported()])[0]["notes"][2]["quality"], "dropped");
     }
 }

@@ -1,6 +1,6 @@
 //! MTL's Phong terms: `Ks`, `Ns` and `Ni` with their maps.
 
-use super::Conversion;
+use super::{Conversion, SCALAR};
 use crate::color::Rgb;
 use crate::convert::tint::fit_tint;
 use crate::convert::{PhongRoughness, Quality};
@@ -32,10 +32,16 @@ impl Conversion<'_> {
             self.warn("Ks is black and would hide map_Ks; the map is taken as it is".to_owned());
             ks = Rgb::WHITE;
         }
-        let reason = "the mean is Disney's specular; Phong's Ks has no Fresnel term";
         self.set(Parameter::Specular, ks.mean());
         if self.source.ks.is_some() {
-            self.note("Ks", Quality::Approximated, reason);
+            let (quality, reason) = match self.reflecting_index() {
+                Some(_) => (Quality::Dropped, "Ni gives the specular"),
+                None => {
+                    let reason = "the mean is Disney's specular; Phong's Ks has no Fresnel term";
+                    (Quality::Approximated, reason)
+                }
+            };
+            self.note("Ks", quality, reason);
         }
         if let Some(map) = map {
             *self.out.scalar_mut(Parameter::Specular) = Param::Texture { map, factor: ks.mean() };
@@ -51,11 +57,16 @@ impl Conversion<'_> {
     }
 
     /// `Ni`, where `illum` asks for Fresnel reflection.
+    fn reflecting_index(&self) -> Option<f32> {
+        self.source.ni.filter(|&ni| ni > 0.0 && self.source.illum.unwrap_or(2) >= 4)
+    }
+
+    /// The specular by `Ni`, where it decides.
     fn refractive_index(&mut self) {
         let Some(ni) = self.source.ni else { return };
         if self.source.illum.unwrap_or(2) < 4 {
             self.note("Ni", Quality::Dropped, "below illum 4 the specular is Ks's");
-        } else if ni > 0.0 {
+        } else if let Some(ni) = self.reflecting_index() {
             // F0 of a dielectric interface over the 0.08 of specular = 1.
             let f0 = ((ni - 1.0) / (ni + 1.0)).sqr();
             let specular = self.limited("specular from Ni", f0 / 0.08, Parameter::Specular.max());
@@ -82,7 +93,7 @@ impl Conversion<'_> {
             }
             return;
         }
-        let map = self.map(MtlSlot::Ns, TextureChannel::R);
+        let map = self.map(MtlSlot::Ns, SCALAR);
         match self.options.phong {
             PhongRoughness::Walter => self.exponent_by_walter(map),
             PhongRoughness::Blender => self.exponent_by_blender(map),
@@ -125,12 +136,11 @@ impl Conversion<'_> {
     /// Notes on specular statements that the model has no place for.
     fn phong_left_out(&mut self) {
         let glass = self.out.model == Model::Dielectric;
-        let reason = if glass {
-            "smooth glass reflects by its refractive index"
-        } else {
-            "illum 0 and 1 have no highlight"
+        let (quality, reason) = match self.source.illum {
+            _ if glass => (Quality::Approximated, "smooth glass reflects by its refractive index"),
+            Some(0 | 1) => (Quality::Exact, "illum 0 and 1 have no highlight"),
+            _ => (Quality::Exact, "there is no highlight: Ks is black"),
         };
-        let quality = if glass { Quality::Approximated } else { Quality::Exact };
         let given = [
             ("Ks", self.source.ks.is_some()),
             ("Ns", self.source.ns.is_some()),

@@ -2,10 +2,10 @@
 
 use std::f32::consts::TAU;
 
-use super::Conversion;
+use super::{Conversion, SCALAR};
 use crate::convert::Quality;
 use crate::disney::{Model, Parameter};
-use crate::scene::material::{Curve, Param, TextureChannel, TextureMap};
+use crate::scene::material::{Curve, Param, TextureMap};
 use crate::scene::source::MtlSlot;
 
 impl Conversion<'_> {
@@ -73,7 +73,7 @@ impl Conversion<'_> {
         curve: Curve,
         told: (Quality, &str),
     ) {
-        let Some(map) = self.map(slot, TextureChannel::R) else {
+        let Some(map) = self.map(slot, SCALAR) else {
             return self.scalar(field, value, to, curve, told);
         };
         *self.out.scalar_mut(to) = Param::Texture { map: TextureMap { curve, ..map }, factor: 1.0 };

@@ -21,6 +21,13 @@ fn constant(material: &Material, parameter: Parameter) -> f32 {
     material.scalar(parameter).constant().unwrap()
 }
 
+/// A slot with the texture `id`.
+fn loaded(slot: MtlSlot, id: u32) -> (MtlSlot, MtlMap) {
+    let mut map = MtlMap::new("a.png", 3);
+    map.texture = Some(TextureId(id));
+    (slot, map)
+}
+
 #[test]
 fn plain_colours_are_lambert_exactly() {
     let color = Rgb::new(0.6, 0.1, 0.1);
@@ -36,6 +43,15 @@ fn plain_colours_are_lambert_exactly() {
             ..Default::default()
         },
         MtlMaterial { kd, illum: Some(2), ..Default::default() },
+        MtlMaterial {
+            kd,
+            illum: Some(2),
+            ks: Some(Rgb::BLACK),
+            ns: Some(10.0),
+            ni: Some(1.5),
+            maps: vec![loaded(MtlSlot::Ns, 1)],
+            ..Default::default()
+        },
     ] {
         let (material, notes, warnings) = converted(&source);
         assert_eq!(material.model, Model::Diffuse);
@@ -44,6 +60,25 @@ fn plain_colours_are_lambert_exactly() {
         assert!(notes.iter().all(|n| n.quality == Quality::Exact), "{notes:?}");
         assert!(warnings.is_empty());
     }
+}
+
+#[test]
+fn a_black_ks_leaves_a_highlight_to_its_map_and_to_ni() {
+    let black = MtlMaterial { ks: Some(Rgb::BLACK), ns: Some(10.0), ..Default::default() };
+    let mapped = MtlMaterial { maps: vec![loaded(MtlSlot::Ks, 1)], ..black.clone() };
+    assert_eq!(converted(&mapped).0.model, Model::Disney);
+    let (material, notes, _) = converted(&MtlMaterial { illum: Some(5), ni: Some(1.5), ..black });
+    assert_eq!(material.model, Model::Disney);
+    assert!((constant(&material, Parameter::Specular) - 0.5).abs() < 1e-6);
+    assert_eq!(quality(&notes, "Ks"), Some(Quality::Dropped), "Ni is there in its place");
+}
+
+#[test]
+fn clamped_maps_tell_what_is_beyond_them() {
+    let (slot, mut map) = loaded(MtlSlot::Kd, 1);
+    map.wrap = Wrap::Clamp;
+    let (_, notes, _) = converted(&MtlMaterial { maps: vec![(slot, map)], ..Default::default() });
+    assert_eq!(quality(&notes, "map_Kd -clamp"), Some(Quality::Approximated));
 }
 
 #[test]
@@ -159,11 +194,6 @@ fn maps_multiply_and_their_options_act_on_v_upwards() {
 
 #[test]
 fn maps_of_highlights_and_coats_vary_their_parameters() {
-    let loaded = |slot, id| {
-        let mut map = MtlMap::new("a.png", 3);
-        map.texture = Some(TextureId(id));
-        (slot, map)
-    };
     let source = MtlMaterial {
         ks: Some(Rgb::grey(0.5)),
         ns: Some(100.0),
@@ -176,14 +206,14 @@ fn maps_of_highlights_and_coats_vary_their_parameters() {
     };
     let (material, notes, _) = converted(&source);
     assert_eq!(*material.scalar(Parameter::Specular), read(1, TextureChannel::Y, Curve::Linear, 0.5));
-    let exponent = read(2, TextureChannel::R, Curve::RoughnessOfExponent, 100.0);
+    let exponent = read(2, TextureChannel::Y, Curve::RoughnessOfExponent, 100.0);
     assert_eq!(*material.scalar(Parameter::Roughness), exponent);
     assert_eq!(quality(&notes, "map_Ks"), Some(Quality::Approximated));
     // As Blender reads them: the map is the roughness.
     let blender = ConvertOptions { phong: PhongRoughness::Blender, ..Default::default() };
     let mut notes = Vec::new();
     let material = convert("m", &source, &blender, &mut notes, &mut Vec::new());
-    assert_eq!(*material.scalar(Parameter::Roughness), read(2, TextureChannel::R, Curve::Linear, 1.0));
+    assert_eq!(*material.scalar(Parameter::Roughness), read(2, TextureChannel::Y, Curve::Linear, 1.0));
     assert_eq!(quality(&notes, "Ns"), Some(Quality::Dropped));
     let plain = MtlMaterial { maps: Vec::new(), ns: Some(250.0), ..source };
     let material = convert("m", &plain, &blender, &mut Vec::new(), &mut Vec::new());
@@ -195,8 +225,8 @@ fn maps_of_highlights_and_coats_vary_their_parameters() {
         ..Default::default()
     };
     let (material, ..) = converted(&coat);
-    assert_eq!(*material.scalar(Parameter::Clearcoat), read(3, TextureChannel::R, Curve::Linear, 1.0));
-    let gloss = read(4, TextureChannel::R, Curve::GlossOfRoughness, 1.0);
+    assert_eq!(*material.scalar(Parameter::Clearcoat), read(3, TextureChannel::Y, Curve::Linear, 1.0));
+    let gloss = read(4, TextureChannel::Y, Curve::GlossOfRoughness, 1.0);
     assert_eq!(*material.scalar(Parameter::ClearcoatGloss), gloss);
 }
 

@@ -249,9 +249,12 @@ fn transmission(c: &mut Conversion<'_>, thickness: f32) {
         let volume = volume(c.source.absorption, thickness);
         let reads_back = absorption(volume.attenuation_color, volume.attenuation_distance);
         let off = (reads_back - c.source.absorption).map(f32::abs).max_channel();
-        let reason = format!(
-            "thicknessFactor {thickness}, the mesh's smallest extent, is for those who trace no rays; the coefficients read back off by {off:e}"
+        let mut reason = format!(
+            "thicknessFactor {thickness}, the mesh's smallest extent, is for those who trace no rays"
         );
+        if off > 0.0 {
+            reason.push_str(&format!("; the coefficients read back off by {off:e}"));
+        }
         c.note("absorption", Quality::Exact, reason);
         c.out.volume = Some(volume);
     }

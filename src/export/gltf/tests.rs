@@ -242,7 +242,8 @@ fn other_models_become_what_is_nearest() {
     assert_eq!(quality(&notes, "mirror"), Quality::Approximated);
     let mut glass = of(Model::Dielectric);
     *glass.scalar_mut(Parameter::Ior) = Param::Constant(1.7);
-    let (glass, _) = write(&glass);
+    let (glass, notes) = write(&glass);
+    assert!(!notes.iter().any(|n| n.reason.contains("0e0")), "what isn't off isn't told: {notes:?}");
     assert_eq!((glass.ior, glass.transmission.unwrap().factor, glass.double_sided), (Some(1.7), 1.0, false));
     assert!(glass.volume.unwrap().thickness > 0.0 && glass.base_color_factor == Rgb::WHITE);
     let (paper, notes) = write(&of(Model::Diffuse));

@@ -25,8 +25,6 @@ pub(super) struct Cleaned {
     pub groups: Vec<Group>,
     /// The material libraries as the file names them, each with its line.
     pub libraries: Vec<(String, u32)>,
-    /// Whether vertices have colours.
-    pub colored: bool,
 }
 
 /// Faces that share object and material.
@@ -125,7 +123,6 @@ pub(super) fn clean(
         faces.read(line, &statement, &mut flaws)?;
     }
     let Faces { mut out, smooth, .. } = faces;
-    out.colored = vertices.colored;
     out.stream = vertices.into_stream(smooth);
     for (i, group) in out.groups.iter_mut().enumerate() {
         // Writing to a string cannot fail.
@@ -195,6 +192,7 @@ struct Vertices {
     points: Vec<Vec3>,
     /// Indices of vertices that are not finite, ascending.
     bad: Vec<usize>,
+    /// Whether a vertex had a colour; from then on all need one for `tobj`, and those without have NaN.
     colored: bool,
 }
 
@@ -254,13 +252,13 @@ impl Vertices {
         };
         if color.is_some() && !self.colored {
             self.colored = true;
-            self.positions = self.positions.replace('\n', " 1 1 1\n");
+            self.positions = self.positions.replace('\n', " NaN NaN NaN\n");
         }
         let _ = write!(self.positions, "v {x} {y} {z}");
         if self.colored {
             let rgb = color.map(|c| std::array::from_fn(|i| finite(c[i])));
             let [r, g, b] = match rgb {
-                None => [1.0; 3],
+                None => [f32::NAN; 3],
                 Some([Some(r), Some(g), Some(b)]) => [r, g, b],
                 Some(_) => {
                     flaws.add(Flaw::ColorUnreadable, line);

@@ -49,7 +49,7 @@ pub(super) fn read(
             continue;
         };
         let place = format!("{name}:{}", group.line);
-        let mesh = Builder::new(&model.mesh, &place).build(&group.name, cleaned.colored, warnings)?;
+        let mesh = Builder::new(&model.mesh, &place).build(&group.name, warnings)?;
         if !mesh.triangles.is_empty() {
             parts.push(Part {
                 name: group.name.clone(),
@@ -74,6 +74,7 @@ struct Builder<'a> {
     vertices: HashMap<(u32, Option<u32>, NormalKey), u32>,
     has_uvs: bool,
     has_normals: bool,
+    has_colors: bool,
     uvs_missing: bool,
 }
 
@@ -94,6 +95,7 @@ impl<'a> Builder<'a> {
             vertices: HashMap::new(),
             has_uvs: false,
             has_normals: false,
+            has_colors: source.vertex_color.iter().any(|c| !c.is_nan()),
             uvs_missing: false,
         };
         let all = 0..source.indices.len();
@@ -102,7 +104,7 @@ impl<'a> Builder<'a> {
         builder
     }
 
-    fn build(mut self, name: &str, colored: bool, warnings: &mut Vec<Warning>) -> Result<Mesh, ObjError> {
+    fn build(mut self, name: &str, warnings: &mut Vec<Warning>) -> Result<Mesh, ObjError> {
         let (mut doubtful, mut without_area) = (0_u64, 0_u64);
         let mut triangles = Vec::new();
         let mut points = Vec::new();
@@ -135,7 +137,7 @@ impl<'a> Builder<'a> {
                 }
                 let mut triangle = [0; 3];
                 for (slot, &i) in triangle.iter_mut().zip(t) {
-                    *slot = self.vertex(start + i, face, face_normal, colored)?;
+                    *slot = self.vertex(start + i, face, face_normal)?;
                 }
                 self.mesh.triangles.push(triangle);
             }
@@ -174,13 +176,7 @@ impl<'a> Builder<'a> {
     }
 
     /// The index of the vertex at a corner, made on first use.
-    fn vertex(
-        &mut self,
-        corner: usize,
-        face: usize,
-        face_normal: Vec3,
-        colored: bool,
-    ) -> Result<u32, ObjError> {
+    fn vertex(&mut self, corner: usize, face: usize, face_normal: Vec3) -> Result<u32, ObjError> {
         let position = self.source.indices[corner];
         let uv = self.uv_index(corner);
         let normal = match self.normal_index(corner) {
@@ -215,11 +211,14 @@ impl<'a> Builder<'a> {
                 self.mesh.normals.push(given.as_dvec3().normalize_or_zero().as_vec3());
             }
         }
-        if colored {
+        if self.has_colors {
             let color = &self.source.vertex_color[position as usize * 3..][..3];
             // Painting programs write display colours.
             let linear = |c: f32| linear_from_srgb(c.clamp(0.0, 1.0));
-            self.mesh.colors.push(Vec4::new(linear(color[0]), linear(color[1]), linear(color[2]), 1.0));
+            self.mesh.colors.push(match color {
+                [r, ..] if r.is_nan() => Vec4::ONE,
+                rgb => Vec4::new(linear(rgb[0]), linear(rgb[1]), linear(rgb[2]), 1.0),
+            });
         }
         Ok(index)
     }

@@ -16,7 +16,7 @@ mod smoothing;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use glam::Affine3A;
+use glam::{Affine3A, Vec4};
 
 use super::Files;
 use crate::record::Warning;
@@ -27,6 +27,9 @@ use maps::Maps;
 
 /// The material of faces that name none.
 const DEFAULT_MATERIAL: &str = "default";
+
+/// The colour of a mesh without vertex colours whose material others have them for: as grey as without any.
+const UNCOLORED: Vec4 = Vec4::new(0.8, 0.8, 0.8, 1.0);
 
 /// Why an OBJ file cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -125,8 +128,11 @@ pub(super) fn import(
         ids.insert(material.clone(), MaterialId(scene.materials.len() as u32));
         scene.materials.push(Named::new(material, SourceMaterial::Mtl(item)));
     }
-    for part in geometry.parts {
+    for mut part in geometry.parts {
         let Some(&material) = ids.get(part.material.as_deref().unwrap_or(DEFAULT_MATERIAL)) else { continue };
+        if takes_vertex_colors(&scene.materials[material.0 as usize].item) && part.mesh.colors.is_empty() {
+            part.mesh.colors = vec![UNCOLORED; part.mesh.positions.len()];
+        }
         let label = if part.name.is_empty() { name.to_owned() } else { part.name };
         scene.instances.push(Instance {
             name: label,
@@ -138,6 +144,11 @@ pub(super) fn import(
     }
     (scene.images, scene.textures) = (maps.images, maps.textures);
     Ok((scene, warnings))
+}
+
+/// Whether the colours of the meshes' vertices are the material.
+fn takes_vertex_colors(material: &SourceMaterial) -> bool {
+    matches!(material, SourceMaterial::Mtl(mtl) if mtl.vertex_color)
 }
 
 /// All triangles of the OBJ file `name` as one mesh, without materials.
@@ -227,7 +238,8 @@ fn used_materials(
             let what = format!("material {name:?} is in no library; a grey one is taken");
             warnings.push(Warning::new(format!("{obj}:{}", part.line), what));
         }
-        let vertex_color = !part.mesh.colors.is_empty();
+        let shares = |other: &&Part| other.material.as_deref().unwrap_or(DEFAULT_MATERIAL) == name;
+        let vertex_color = parts.iter().filter(shares).any(|part| !part.mesh.colors.is_empty());
         missing.push((
             name.to_owned(),
             MtlMaterial { vertex_color, ..MtlMaterial::default() },

@@ -215,6 +215,7 @@ impl Parser<'_> {
                         "g" => Some(TextureChannel::G),
                         "b" => Some(TextureChannel::B),
                         "m" => Some(TextureChannel::A),
+                        "l" => Some(TextureChannel::Y),
                         _ => {
                             self.warn(format!("-imfchan {} is not read; left out", shown(value)));
                             None
@@ -314,7 +315,7 @@ mod tests {
     #[test]
     fn map_options_and_names_with_blanks_are_read() {
         let (m, warnings) = one(
-            "map_Kd -s 2 3 1 -o .5 -clamp on \"my wood.png\"\nbump -bm .2 a\\b c.png\nmap_d -imfchan g x.png\n",
+            "map_Kd -s 2 3 1 -o .5 -clamp on \"my wood.png\"\nbump -bm .2 a\\b c.png\nmap_d -imfchan g x.png\nmap_Ns -imfchan l x.png\n",
         );
         assert!(warnings.is_empty(), "{warnings:?}");
         let kd = m.map(MtlSlot::Kd).unwrap();
@@ -326,6 +327,7 @@ mod tests {
         let bump = m.map(MtlSlot::Bump).unwrap();
         assert_eq!((bump.file.as_str(), bump.bump_multiplier), ("a\\b c.png", 0.2));
         assert_eq!(m.map(MtlSlot::D).unwrap().channel, Some(TextureChannel::G));
+        assert_eq!(m.map(MtlSlot::Ns).unwrap().channel, Some(TextureChannel::Y));
     }
 
     #[test]

@@ -146,6 +146,23 @@ fn colours_on_some_vertices_only_are_white_elsewhere() {
 }
 
 #[test]
+fn objects_without_colours_stay_grey_beside_coloured_ones() {
+    let grey = "o grey\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\n";
+    let red = "o red\nv 0 0 1 1 0 0\nv 1 0 1 1 0 0\nv 1 1 1 1 0 0\nf -3 -2 -1\n";
+    for (text, grey_one) in [(format!("{grey}{red}"), 0), (format!("{red}{grey}"), 1)] {
+        let (scene, warnings) = ok(&text);
+        assert!(mtl(&scene, "default").vertex_color && warnings.is_empty());
+        assert_eq!(scene.meshes[grey_one].colors, [UNCOLORED; 3]);
+        assert_eq!(scene.meshes[1 - grey_one].colors, [Vec4::new(1.0, 0.0, 0.0, 1.0); 3]);
+    }
+    let library: &[u8] = b"newmtl m\nKd 1 1 1\n";
+    let (_, warnings) =
+        import_with(&format!("mtllib m.mtl\nusemtl m\n{grey}usemtl none\n{red}"), &[("m.mtl", library)])
+            .unwrap();
+    assert!(!warnings.iter().any(|w| w.message.contains("not used")), "its mesh has none: {warnings:?}");
+}
+
+#[test]
 fn objects_and_materials_make_instances_in_the_order_of_the_file() {
     let text =
         format!("{QUAD}o A\nusemtl x\nf 1 2 3\nusemtl y\nf 1 2 4\nusemtl x\nf 1 3 4\no B b\nf 2 3 4\n");
