@@ -82,7 +82,7 @@ impl Block {
             return ControlFlow::Continue(());
         }
 
-        let scale = ray.sheared_inverse[2];
+        let scale = lanes.splat(ray.sheared.inverse[2]);
         let inverse = lanes.splat(1.0) / (u + v + w);
         let t = (u * (scale * az) + v * (scale * bz) + w * (scale * cz)) * inverse;
         let (x, y, z) = (largest(ax, bx, cx), largest(ay, by, cy), largest(az, bz, cz));
@@ -125,7 +125,7 @@ impl Block {
         let (a, b) = (lanes.load(&self.vertices[0][axis]), lanes.load(&self.vertices[1][axis]));
         let c = lanes.load(&self.vertices[2][axis]);
         let near = if ray.sheared.inverse[i] < 0.0 { a.max(b).max(c) } else { a.min(b).min(c) };
-        (near - ray.sheared_origin[i]) * ray.sheared_inverse[i]
+        (near - lanes.splat(ray.sheared.origin[i])) * lanes.splat(ray.sheared.inverse[i])
     }
 }
 

@@ -2,6 +2,7 @@
 //! "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", section 3.2.
 
 use glam::Vec3;
+use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
 use super::block::Block;
@@ -13,57 +14,66 @@ const BLOCK_COST: f32 = 1.0;
 /// The cheapest ways to cut a binary tree into wide nodes.
 pub(super) struct Plan<'a> {
     tree: &'a Bvh2,
-    /// By node and number: the cost of at most 1, 2, … 7 children that hold the node's triangles, relative to a test of the root.
-    costs: Vec<[f32; 7]>,
-    /// By node, the number and the area of its triangles.
-    contents: Vec<(u32, f32)>,
+    /// The half area of the root's box.
+    whole: f64,
+    /// What is under each node.
+    parts: Vec<Part>,
+}
+
+/// A binary node as part of wide ones.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    /// The cost of at most 1, 2, … 7 children that hold the node's triangles, relative to a test of the root.
+    costs: [f32; 7],
+    /// How many triangles those are.
+    count: u32,
+    /// Their area.
+    area: f32,
 }
 
 impl<'a> Plan<'a> {
-    /// Plans for a `tree` with one triangle a leaf.
+    /// Plans for a `tree` with one triangle a leaf and parents before their children.
     pub(super) fn new(tree: &'a Bvh2, triangles: &[[Vec3; 3]]) -> Self {
+        // In the order of memory.
+        let areas: Vec<f32> = triangles.iter().map(|&[a, b, c]| (b - a).cross(c - a).length()).collect();
         let mut plan = Self {
             tree,
-            costs: vec![[0.0; 7]; tree.nodes.len()],
-            contents: vec![(0, 0.0); tree.nodes.len()],
+            whole: half_area(&tree.nodes[0].aabb).max(f64::MIN_POSITIVE),
+            parts: vec![Part::default(); tree.nodes.len()],
         };
-        for n in parents_first(tree).into_iter().rev() {
-            let probability = plan.probability(n);
-            let (contents, costs) = match plan.children(n) {
-                None => {
-                    let [a, b, c] = triangles[plan.triangle(n) as usize];
-                    ((1, (b - a).cross(c - a).length()), [BLOCK_COST * probability; 7])
-                }
-                Some([l, r]) => {
-                    let (left, right) = (plan.contents[l as usize], plan.contents[r as usize]);
-                    let count = left.0 + right.0;
-                    let inner = NODE_COST * probability + plan.cheapest_cut(l, r, 8).1;
-                    let leaf = BLOCK_COST * probability;
-                    let mut costs = [if count as usize <= Block::ROOM { leaf.min(inner) } else { inner }; 7];
-                    for i in 1..7 {
-                        costs[i] = plan.cheapest_cut(l, r, i + 1).1.min(costs[i - 1]);
-                    }
-                    ((count, left.1 + right.1), costs)
-                }
+        for n in (0..tree.nodes.len() as u32).rev() {
+            plan.parts[n as usize] = match plan.children(n) {
+                None => Part {
+                    costs: [BLOCK_COST * plan.probability(n); 7],
+                    count: 1,
+                    area: areas[plan.triangle(n) as usize],
+                },
+                Some(children) => plan.joined(n, children.map(|c| plan.parts[c as usize])),
             };
-            plan.contents[n as usize] = contents;
-            plan.costs[n as usize] = costs;
         }
         plan
     }
 
+    fn joined(&self, n: u32, [left, right]: [Part; 2]) -> Part {
+        let cut = |room: usize| {
+            let costs = (1..room).map(|k| left.costs[k - 1] + right.costs[room - k - 1]);
+            costs.fold(f32::INFINITY, f32::min)
+        };
+        let count = left.count + right.count;
+        let probability = self.probability(n);
+        let inner = NODE_COST * probability + cut(8);
+        let fits = count as usize <= Block::ROOM;
+        let mut costs = [if fits { inner.min(BLOCK_COST * probability) } else { inner }; 7];
+        for i in 1..7 {
+            costs[i] = cut(i + 1).min(costs[i - 1]);
+        }
+        Part { costs, count, area: left.area + right.area }
+    }
+
     /// A node's triangles, if it is to be a leaf.
     pub(super) fn leaf(&self, n: u32) -> Option<Vec<u32>> {
-        let fits = self.contents[n as usize].0 as usize <= Block::ROOM;
-        let is_leaf = match self.children(n) {
-            None => true,
-            Some([l, r]) if fits => {
-                let probability = self.probability(n);
-                let inner = NODE_COST * probability + self.cheapest_cut(l, r, 8).1;
-                BLOCK_COST * probability <= inner
-            }
-            Some(_) => false,
-        };
+        let part = &self.parts[n as usize];
+        let is_leaf = part.count as usize <= Block::ROOM && BLOCK_COST * self.probability(n) <= part.costs[0];
         is_leaf.then(|| self.triangles(n))
     }
 
@@ -72,7 +82,10 @@ impl<'a> Plan<'a> {
     pub(super) fn wide_children(&self, n: u32) -> Vec<u32> {
         let mut chosen = Vec::with_capacity(8);
         self.cut(n, 8, &mut chosen);
-        let promise = |n: u32| self.contents[n as usize].1 / self.costs[n as usize][0].max(f32::MIN_POSITIVE);
+        let promise = |n: u32| {
+            let part = &self.parts[n as usize];
+            part.area / part.costs[0].max(f32::MIN_POSITIVE)
+        };
         chosen.sort_by(|&a, &b| promise(b).total_cmp(&promise(a)));
         chosen
     }
@@ -85,7 +98,7 @@ impl<'a> Plan<'a> {
 
     /// The triangles under a node, in the tree's order.
     pub(super) fn triangles(&self, n: u32) -> Vec<u32> {
-        let mut found = Vec::with_capacity(self.contents[n as usize].0 as usize);
+        let mut found = Vec::with_capacity(self.parts[n as usize].count as usize);
         let mut pending = vec![n];
         while let Some(n) = pending.pop() {
             match self.children(n) {
@@ -99,9 +112,9 @@ impl<'a> Plan<'a> {
     /// Divides an inner node into at most `room` children.
     fn cut(&self, n: u32, room: usize, chosen: &mut Vec<u32>) {
         let Some([l, r]) = self.children(n) else { return chosen.push(n) };
-        let (left, _) = self.cheapest_cut(l, r, room);
+        let left = self.cheapest_cut(l, r, room);
         for (child, mut room) in [(l, left), (r, room - left)] {
-            let costs = &self.costs[child as usize];
+            let costs = &self.parts[child as usize].costs;
             while room > 1 && costs[room - 2] <= costs[room - 1] {
                 room -= 1;
             }
@@ -109,27 +122,16 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// How many of `room` children the left one should get, and what that costs.
-    fn cheapest_cut(&self, left: u32, right: u32, room: usize) -> (usize, f32) {
-        let (l, r) = (&self.costs[left as usize], &self.costs[right as usize]);
-        let mut best = (1, l[0] + r[room - 2]);
-        for k in 2..room {
-            let cost = l[k - 1] + r[room - k - 1];
-            if cost < best.1 {
-                best = (k, cost);
-            }
-        }
-        best
+    /// How many of `room` children the left one should get.
+    fn cheapest_cut(&self, left: u32, right: u32, room: usize) -> usize {
+        let [l, r] = [left, right].map(|n| &self.parts[n as usize].costs);
+        let cost = |k: usize| l[k - 1] + r[room - k - 1];
+        (1..room).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(1)
     }
 
-    /// That a ray meets a node's box if it meets the root's. In f64, which no area of floats overflows.
+    /// That a ray meets a node's box if it meets the root's.
     fn probability(&self, n: u32) -> f32 {
-        let area = |n: u32| {
-            let aabb = &self.tree.nodes[n as usize].aabb;
-            let size = Vec3::from(aabb.max).as_dvec3() - Vec3::from(aabb.min).as_dvec3();
-            size.x * size.y + size.y * size.z + size.z * size.x
-        };
-        (area(n) / area(0).max(f64::MIN_POSITIVE)) as f32
+        (half_area(&self.tree.nodes[n as usize].aabb) / self.whole) as f32
     }
 
     fn children(&self, n: u32) -> Option<[u32; 2]> {
@@ -142,16 +144,8 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// All nodes, each before its children.
-fn parents_first(tree: &Bvh2) -> Vec<u32> {
-    let mut order = Vec::with_capacity(tree.nodes.len());
-    let mut pending = vec![0];
-    while let Some(n) = pending.pop() {
-        order.push(n);
-        let node = &tree.nodes[n as usize];
-        if node.prim_count == 0 {
-            pending.extend([node.first_index, node.first_index + 1]);
-        }
-    }
-    order
+/// In f64, which no area of floats overflows.
+fn half_area(aabb: &Aabb) -> f64 {
+    let size = Vec3::from(aabb.max).as_dvec3() - Vec3::from(aabb.min).as_dvec3();
+    size.x * size.y + size.y * size.z + size.z * size.x
 }

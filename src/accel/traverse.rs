@@ -22,10 +22,6 @@ const ROBUST_FAR: f32 = 1.000_000_4;
 /// A ray made ready for eight boxes or triangles at a time.
 pub(super) struct Beam<L: Lanes> {
     pub(super) sheared: ShearedRay,
-    /// As in `sheared`.
-    pub(super) sheared_origin: [L::Floats; 3],
-    pub(super) shear: [L::Floats; 2],
-    pub(super) sheared_inverse: [L::Floats; 3],
     /// The triangle that it starts on.
     pub(super) source: u32,
     origin: [L::Floats; 3],
@@ -41,13 +37,9 @@ impl<L: Lanes> Beam<L> {
         if !(ray.origin.is_finite() && ray.direction.is_finite()) {
             return None;
         }
-        let sheared = ShearedRay::new(ray);
         let inverse = ray.direction.to_array().map(|d| 1.0 / d);
         Some(Self {
-            sheared_origin: sheared.origin.map(|v| lanes.splat(v)),
-            shear: sheared.shear.map(|v| lanes.splat(v)),
-            sheared_inverse: sheared.inverse.map(|v| lanes.splat(v)),
-            sheared,
+            sheared: ShearedRay::new(ray),
             source: ray.source.unwrap_or(NOBODY),
             origin: ray.origin.to_array().map(|v| lanes.splat(v)),
             inverse: inverse.map(|v| lanes.splat(v)),
@@ -58,11 +50,11 @@ impl<L: Lanes> Beam<L> {
     /// Points in the ray's space: sheared x and y, and unscaled z.
     #[inline(always)]
     pub(super) fn shear(&self, lanes: L, points: &[[f32; 8]; 3]) -> (L::Floats, L::Floats, L::Floats) {
-        let [kx, ky, kz] = self.sheared.axes;
-        let [ox, oy, oz] = self.sheared_origin;
-        let z = lanes.load(&points[kz]) - oz;
-        let (x, y) = (lanes.load(&points[kx]) - ox, lanes.load(&points[ky]) - oy);
-        (x - self.shear[0] * z, y - self.shear[1] * z, z)
+        let ShearedRay { axes: [kx, ky, kz], origin: [ox, oy, oz], shear: [sx, sy], .. } = self.sheared;
+        let z = lanes.load(&points[kz]) - lanes.splat(oz);
+        let x = lanes.load(&points[kx]) - lanes.splat(ox) - lanes.splat(sx) * z;
+        let y = lanes.load(&points[ky]) - lanes.splat(oy) - lanes.splat(sy) * z;
+        (x, y, z)
     }
 }
 

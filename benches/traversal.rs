@@ -1,0 +1,234 @@
+//! How fast rays are traced: `cargo bench --bench traversal`, one thread.
+//!
+//! Rays of a 640 × 480 picture, and two diffuse bounces of them, through the project's scenes and, where the environment's
+//! `PIPELINE_CORPUS` names the folder, through its kitchen and bunny. Beside ours stands the traversal that obvhs comes with, of its
+//! binary and of its eight-wide tree, with its triangle test, which is not watertight. Figures are millions of rays a second, the medians
+//! of rounds in which all take turns, and the ratio of ours to the faster of the others.
+
+use std::hint::black_box;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2_from_tris;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh_from_tris;
+use obvhs::ray::RayHit;
+use obvhs::rt_triangle::RtTriangle;
+use obvhs::triangle::Triangle;
+use pipeline::accel::{Bvh, Ray};
+use pipeline::convert::ConvertOptions;
+use pipeline::import::ImportOptions;
+use pipeline::job::load;
+use pipeline::math::{Frame, hash, warp};
+use pipeline::scene::camera::{FovAxis, Projection};
+use pipeline::scene::{Camera, Scene};
+
+const ROUNDS: usize = 7;
+const SIZE: (u32, u32) = (640, 480);
+
+fn main() {
+    let mut out = std::io::stdout().lock();
+    let mut line = |text: String| writeln!(out, "{text}").expect("stdout");
+    for path in files() {
+        let loaded =
+            load(&path, &ImportOptions::default(), &ConvertOptions::default(), None).expect("a scene");
+        let triangles = flattened(&loaded.scene);
+        let contest = Contest::new(&triangles);
+        line(format!("{}: {}", path.file_name().unwrap_or_default().display(), contest.report));
+        line(format!(
+            "  {:<9} {:<8} {:>8} {:>8} {:>8} {:>8} {:>8}",
+            "rays", "hit", "thousand", "ours", "bvh2", "cwbvh", "ratio"
+        ));
+        let mut rays = camera_rays(&view(&loaded.scene, &path));
+        for kind in ["camera", "bounce 1", "bounce 2"] {
+            for (hit, [ours, bvh2, cwbvh]) in
+                [("closest", contest.closest(&rays)), ("any", contest.any(&rays))]
+            {
+                let thousand = rays.len() as f64 * 1e-3;
+                let ratio = ours / bvh2.max(cwbvh);
+                line(format!(
+                    "  {kind:<9} {hit:<8} {thousand:>8.0} {ours:>8.2} {bvh2:>8.2} {cwbvh:>8.2} {ratio:>8.2}"
+                ));
+            }
+            rays = bounced(&contest.ours, &triangles, &rays);
+        }
+    }
+}
+
+/// The scenes there are.
+fn files() -> Vec<PathBuf> {
+    let own = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes"));
+    let mut files: Vec<PathBuf> =
+        ["shaderball.glb", "statue.glb.gz", "cornell.obj"].iter().map(|name| own.join(name)).collect();
+    if let Some(corpus) = std::env::var_os("PIPELINE_CORPUS") {
+        let obj = PathBuf::from(corpus).join("obj");
+        files.extend(["kitchen.obj.zst", "stanford-bunny.obj.zst"].map(|name| obj.join(name)));
+    }
+    files
+}
+
+/// The scene's own or fitting view; the kitchen is looked at from inside.
+fn view(scene: &Scene, path: &Path) -> Camera {
+    match scene.bounds() {
+        Some((low, high)) if path.ends_with("kitchen.obj.zst") => {
+            let eye = low + (high - low) * Vec3::new(0.7, 0.55, 0.8);
+            Camera::look_at(eye, low.midpoint(high), Vec3::Y, 0.9)
+        }
+        _ => scene.cameras[0].item.clone(),
+    }
+}
+
+fn flattened(scene: &Scene) -> Vec<[Vec3; 3]> {
+    let placed = scene.instances.iter().flat_map(|instance| {
+        let mesh = scene.mesh_of(instance);
+        let place = |c: u32| instance.world_from_object.transform_point3(mesh.positions[c as usize]);
+        mesh.triangles.iter().map(move |corners| corners.map(place))
+    });
+    placed.collect()
+}
+
+/// A tree of ours and two of obvhs', over the same triangles.
+struct Contest {
+    ours: Bvh,
+    bvh2: Bvh2,
+    cwbvh: CwBvh,
+    /// In the order of each of their trees.
+    bvh2_triangles: Vec<RtTriangle>,
+    cwbvh_triangles: Vec<RtTriangle>,
+    /// What building them took, in milliseconds.
+    report: String,
+}
+
+impl Contest {
+    fn new(triangles: &[[Vec3; 3]]) -> Self {
+        let corners = |t: &[Vec3; 3]| t.map(Vec3A::from);
+        let theirs: Vec<Triangle> =
+            triangles.iter().map(corners).map(|[v0, v1, v2]| Triangle { v0, v1, v2 }).collect();
+        let medium = BvhBuildParams { pre_split: false, ..BvhBuildParams::medium_build() };
+        let (mut ours, mut bvh2) = (Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            ours.push(timed(|| Bvh::build(triangles).expect("a tree")));
+            bvh2.push(timed(|| build_bvh2_from_tris(&theirs, medium, &mut Duration::default())));
+        }
+        let (own_time, own) = middle(ours);
+        let (their_time, bvh2) = middle(bvh2);
+        let cwbvh = build_cwbvh_from_tris(&theirs, medium, &mut Duration::default());
+        let ordered = |order: &[u32]| order.iter().map(|&i| RtTriangle::from(&theirs[i as usize])).collect();
+        Self {
+            report: format!(
+                "{} triangles, {:.1} bytes each; built in {:.1} ms, obvhs' medium binary tree in {:.1} ms",
+                own.len(),
+                own.bytes() as f64 / own.len() as f64,
+                own_time * 1e3,
+                their_time * 1e3
+            ),
+            bvh2_triangles: ordered(&bvh2.primitive_indices),
+            cwbvh_triangles: ordered(&cwbvh.primitive_indices),
+            ours: own,
+            bvh2,
+            cwbvh,
+        }
+    }
+
+    /// Millions of rays a second whose nearest hit is found: ours, obvhs' binary and its wide tree.
+    fn closest(&self, rays: &[Ray]) -> [f64; 3] {
+        let bvh2 = |ray: &Ray| {
+            let mut hit = RayHit::none();
+            let test = |ray: &obvhs::ray::Ray, i: usize| self.bvh2_triangles[i].intersect(ray);
+            self.bvh2.ray_traverse(theirs(ray), &mut hit, test)
+        };
+        let cwbvh = |ray: &Ray| {
+            let mut hit = RayHit::none();
+            let test = |ray: &obvhs::ray::Ray, i: usize| self.cwbvh_triangles[i].intersect(ray);
+            self.cwbvh.ray_traverse(theirs(ray), &mut hit, test)
+        };
+        race(rays, |ray| self.ours.closest(ray).is_some(), bvh2, cwbvh)
+    }
+
+    /// The same for rays that ask whether there is any hit.
+    fn any(&self, rays: &[Ray]) -> [f64; 3] {
+        let bvh2 = |ray: &Ray| {
+            !self.bvh2.ray_traverse_miss(theirs(ray), |ray, i| self.bvh2_triangles[i].intersect(ray))
+        };
+        let cwbvh = |ray: &Ray| {
+            !self.cwbvh.ray_traverse_miss(theirs(ray), |ray, i| self.cwbvh_triangles[i].intersect(ray))
+        };
+        race(rays, |ray| self.ours.occluded(ray), bvh2, cwbvh)
+    }
+}
+
+fn theirs(ray: &Ray) -> obvhs::ray::Ray {
+    obvhs::ray::Ray::new(ray.origin.into(), ray.direction.into(), 0.0, ray.t_max)
+}
+
+/// How many million `rays` a second each of three can tell whether they hit.
+fn race(
+    rays: &[Ray],
+    ours: impl Fn(&Ray) -> bool,
+    bvh2: impl Fn(&Ray) -> bool,
+    cwbvh: impl Fn(&Ray) -> bool,
+) -> [f64; 3] {
+    let mut times = [const { Vec::new() }; 3];
+    for _ in 0..ROUNDS {
+        times[0].push(timed(|| rays.iter().filter(|ray| ours(ray)).count()));
+        times[1].push(timed(|| rays.iter().filter(|ray| bvh2(ray)).count()));
+        times[2].push(timed(|| rays.iter().filter(|ray| cwbvh(ray)).count()));
+    }
+    times.map(|times| rays.len() as f64 * 1e-6 / middle(times).0)
+}
+
+/// What `work` gives, and the seconds it takes.
+fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let result = black_box(work());
+    (start.elapsed().as_secs_f64(), result)
+}
+
+/// The run of median time.
+fn middle<T>(mut runs: Vec<(f64, T)>) -> (f64, T) {
+    runs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    runs.swap_remove(ROUNDS / 2)
+}
+
+/// A ray through the middle of each pixel.
+fn camera_rays(camera: &Camera) -> Vec<Ray> {
+    let (width, height) = SIZE;
+    let (half_width, half_height) = match camera.projection {
+        Projection::Perspective { fov, axis } => {
+            let half = libm::tanf(fov * 0.5);
+            let aspect = width as f32 / height as f32;
+            if axis == FovAxis::X { (half, half / aspect) } else { (half * aspect, half) }
+        }
+        Projection::Orthographic { .. } => panic!("the scenes have perspective cameras"),
+    };
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x as f32 + 0.5, y as f32 + 0.5)));
+    let rays = pixels.map(|(x, y)| {
+        let right = (x / width as f32 * 2.0 - 1.0) * half_width;
+        let up = (1.0 - y / height as f32 * 2.0) * half_height;
+        let direction = camera.world_from_camera.transform_vector3(Vec3::new(right, up, -1.0));
+        Ray::new(camera.world_from_camera.translation.into(), direction.normalize())
+    });
+    rays.collect()
+}
+
+/// A ray from each hit of `rays`, in a direction by the cosine around the normal.
+fn bounced(bvh: &Bvh, triangles: &[[Vec3; 3]], rays: &[Ray]) -> Vec<Ray> {
+    let bounce = |(i, ray): (usize, &Ray)| {
+        let hit = bvh.closest(ray)?;
+        let [a, b, c] = triangles[hit.triangle as usize];
+        let normal = (b - a).cross(c - a).try_normalize()?;
+        let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
+        let [b0, b1, b2] = hit.barycentric;
+        let point = a * b0 + b * b1 + c * b2;
+        let unit = |dimension| hash::unit_f32((hash::combine(i as u64, dimension) >> 32) as u32);
+        let local = warp::cosine_hemisphere([unit(rays.len() as u64), unit(rays.len() as u64 + 1)]);
+        let origin = point + normal * (1e-5 * point.abs().max_element());
+        let direction = Frame::from_normal(normal).world_from_local(local).try_normalize()?;
+        Some(Ray { source: Some(hit.triangle), ..Ray::new(origin, direction) })
+    };
+    rays.iter().enumerate().filter_map(bounce).collect()
+}
