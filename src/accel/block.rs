@@ -13,11 +13,7 @@ use glam::Vec3;
 
 use super::Hit;
 use super::lanes::{Floats, Lanes};
-use super::traverse::Beam;
-use super::triangle::{UNCERTAIN, intersect};
-
-/// The index of no triangle.
-pub(super) const NOBODY: u32 = u32::MAX;
+use super::triangle::{NOBODY, ShearedRay, UNCERTAIN, intersect};
 
 /// Triangles, one a lane.
 #[derive(Clone, Copy, Debug)]
@@ -62,14 +58,14 @@ impl Block {
     pub(super) fn each_hit<L: Lanes>(
         &self,
         lanes: L,
-        ray: &Beam<L>,
+        ray: &ShearedRay,
         t_max: f32,
         mut found: impl FnMut(Hit) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let [a, b, c] = &self.vertices;
-        let (ax, ay, az) = ray.shear(lanes, a);
-        let (bx, by, bz) = ray.shear(lanes, b);
-        let (cx, cy, cz) = ray.shear(lanes, c);
+        let (ax, ay, az) = sheared(lanes, ray, a);
+        let (bx, by, bz) = sheared(lanes, ray, b);
+        let (cx, cy, cz) = sheared(lanes, ray, c);
         // Without fusing, two neighbours agree on the sign of their edge.
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
@@ -82,7 +78,7 @@ impl Block {
             return ControlFlow::Continue(());
         }
 
-        let scale = lanes.splat(ray.sheared.inverse[2]);
+        let scale = lanes.splat(ray.inverse[2]);
         let inverse = lanes.splat(1.0) / (u + v + w);
         let t = (u * (scale * az) + v * (scale * bz) + w * (scale * cz)) * inverse;
         let (x, y, z) = (largest(ax, bx, cx), largest(ay, by, cy), largest(az, bz, cz));
@@ -108,7 +104,7 @@ impl Block {
             let (t, barycentric) = if doubtful >> lane & 1 == 0 {
                 (t[lane], barycentric.map(|b| b[lane]))
             } else {
-                match intersect(self.corners(lane), &ray.sheared) {
+                match intersect(self.corners(lane), ray) {
                     Some(hit) if hit.0 <= t_max => hit,
                     _ => continue,
                 }
@@ -120,12 +116,12 @@ impl Block {
 
     /// Where the ray enters the slabs around the triangles across one of the sheared axes; NaN where it runs in a face.
     #[inline(always)]
-    fn entry<L: Lanes>(&self, lanes: L, ray: &Beam<L>, i: usize) -> L::Floats {
-        let axis = ray.sheared.axes[i];
+    fn entry<L: Lanes>(&self, lanes: L, ray: &ShearedRay, i: usize) -> L::Floats {
+        let axis = ray.axes[i];
         let (a, b) = (lanes.load(&self.vertices[0][axis]), lanes.load(&self.vertices[1][axis]));
         let c = lanes.load(&self.vertices[2][axis]);
-        let near = if ray.sheared.inverse[i] < 0.0 { a.max(b).max(c) } else { a.min(b).min(c) };
-        (near - lanes.splat(ray.sheared.origin[i])) * lanes.splat(ray.sheared.inverse[i])
+        let near = if ray.inverse[i] < 0.0 { a.max(b).max(c) } else { a.min(b).min(c) };
+        (near - lanes.splat(ray.origin[i])) * lanes.splat(ray.inverse[i])
     }
 }
 
@@ -133,4 +129,18 @@ impl Block {
 #[inline(always)]
 fn largest<F: Floats>(a: F, b: F, c: F) -> F {
     a.abs().max(b.abs()).max(c.abs())
+}
+
+/// Points in the ray's space: sheared x and y, and unscaled z.
+#[inline(always)]
+fn sheared<L: Lanes>(
+    lanes: L,
+    ray: &ShearedRay,
+    points: &[[f32; 8]; 3],
+) -> (L::Floats, L::Floats, L::Floats) {
+    let ShearedRay { axes: [kx, ky, kz], origin: [ox, oy, oz], shear: [sx, sy], .. } = *ray;
+    let z = lanes.load(&points[kz]) - lanes.splat(oz);
+    let x = lanes.load(&points[kx]) - lanes.splat(ox) - lanes.splat(sx) * z;
+    let y = lanes.load(&points[ky]) - lanes.splat(oy) - lanes.splat(sy) * z;
+    (x, y, z)
 }

@@ -302,8 +302,8 @@ fn trees_hold_every_triangle_once_and_are_never_too_deep() {
     assert!(levels_of_sphere <= 6, "{levels_of_sphere} for 2208 triangles");
     let one = [Vec3::new(-1.0, -1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.0, 1.0, 1.0)];
     let nested = (0..20_000).map(|i| one.map(|p| p * (1.0 + i as f32 * 1e-6)));
-    let halved = (0..250).map(|i| one.map(|p| p * libm::exp2f(i as f32 - 125.0)));
-    for triangles in [vec![one; 20_000], nested.collect(), halved.collect()] {
+    let doubled = (0..80).map(|i| one.map(|p| p * libm::exp2f(i as f32 - 40.0)));
+    for triangles in [vec![one; 20_000], nested.collect(), doubled.collect()] {
         let bvh = Bvh::build(&triangles).unwrap();
         let levels = levels(&bvh);
         assert!(levels <= traverse::MOST_LEVELS, "{levels}");

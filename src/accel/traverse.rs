@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
-use super::block::NOBODY;
 use super::lanes::{Floats, Lanes};
 use super::triangle::ShearedRay;
 use super::{Bvh, Child, Hit, Node, Ray};
@@ -19,11 +18,8 @@ const STACK: usize = 7 * MOST_LEVELS + 1;
 /// Ray Traversal", JCGT 2:2): 1 + 2γ(3).
 const ROBUST_FAR: f32 = 1.000_000_4;
 
-/// A ray made ready for eight boxes or triangles at a time.
-pub(super) struct Beam<L: Lanes> {
-    pub(super) sheared: ShearedRay,
-    /// The triangle that it starts on.
-    pub(super) source: u32,
+/// A ray made ready for eight boxes at a time.
+struct Beam<L: Lanes> {
     origin: [L::Floats; 3],
     inverse: [L::Floats; 3],
     /// Whether it runs towards smaller coordinates.
@@ -39,22 +35,10 @@ impl<L: Lanes> Beam<L> {
         }
         let inverse = ray.direction.to_array().map(|d| 1.0 / d);
         Some(Self {
-            sheared: ShearedRay::new(ray),
-            source: ray.source.unwrap_or(NOBODY),
             origin: ray.origin.to_array().map(|v| lanes.splat(v)),
             inverse: inverse.map(|v| lanes.splat(v)),
             backward: inverse.map(|v| v < 0.0),
         })
-    }
-
-    /// Points in the ray's space: sheared x and y, and unscaled z.
-    #[inline(always)]
-    pub(super) fn shear(&self, lanes: L, points: &[[f32; 8]; 3]) -> (L::Floats, L::Floats, L::Floats) {
-        let ShearedRay { axes: [kx, ky, kz], origin: [ox, oy, oz], shear: [sx, sy], .. } = self.sheared;
-        let z = lanes.load(&points[kz]) - lanes.splat(oz);
-        let x = lanes.load(&points[kx]) - lanes.splat(ox) - lanes.splat(sx) * z;
-        let y = lanes.load(&points[ky]) - lanes.splat(oy) - lanes.splat(sy) * z;
-        (x, y, z)
     }
 }
 
@@ -97,6 +81,8 @@ pub(super) fn closest<L: Lanes>(
     mut counts: impl FnMut(&Hit) -> bool,
 ) -> Option<Hit> {
     let beam = Beam::new(lanes, ray)?;
+    // Many rays meet no leaf.
+    let mut sheared = None;
     let mut nearest = None;
     // No index is lower than 0: the ray's end itself is out of reach.
     let (mut t_max, mut rival) = (ray.t_max, 0);
@@ -104,7 +90,8 @@ pub(super) fn closest<L: Lanes>(
     let mut child = bvh.root;
     loop {
         if let Some(block) = child.block() {
-            let _ = bvh.blocks[block].each_hit(lanes, &beam, t_max, |hit| {
+            let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
+            let _ = bvh.blocks[block].each_hit(lanes, sheared, t_max, |hit| {
                 let is_nearer = hit.t < t_max || (hit.t == t_max && hit.triangle < rival);
                 if is_nearer && counts(&hit) {
                     (t_max, rival) = (hit.t, hit.triangle);
@@ -163,11 +150,13 @@ pub(super) fn visit<L: Lanes>(
     mut visitor: impl FnMut(Hit) -> ControlFlow<()>,
 ) -> bool {
     let Some(beam) = Beam::new(lanes, ray) else { return false };
+    let mut sheared = None;
     let mut pending = ArrayVec::<Child, STACK>::new();
     let mut child = bvh.root;
     loop {
         if let Some(block) = child.block() {
-            let went_through = bvh.blocks[block].each_hit(lanes, &beam, ray.t_max, |hit| {
+            let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
+            let went_through = bvh.blocks[block].each_hit(lanes, sheared, ray.t_max, |hit| {
                 if hit.t < ray.t_max { visitor(hit) } else { ControlFlow::Continue(()) }
             });
             if went_through.is_break() {

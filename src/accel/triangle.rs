@@ -5,6 +5,9 @@ use glam::Vec3;
 
 use super::Ray;
 
+/// The index of no triangle.
+pub(super) const NOBODY: u32 = u32::MAX;
+
 /// How far rounding may put the ray parameter off, in units of what it is made of (Pharr, Jakob and Humphreys 2023, section
 /// 6.8.7, gathered into one factor).
 pub(super) const UNCERTAIN: f32 = 32.0 * f32::EPSILON;
@@ -19,6 +22,8 @@ pub(super) struct ShearedRay {
     pub(super) shear: [f32; 2],
     /// The direction's reciprocal along `axes`.
     pub(super) inverse: [f32; 3],
+    /// The triangle that it starts on.
+    pub(super) source: u32,
 }
 
 impl ShearedRay {
@@ -42,6 +47,7 @@ impl ShearedRay {
             axes,
             shear: [dx / dz, dy / dz],
             inverse: [1.0 / dx, 1.0 / dy, 1.0 / dz],
+            source: ray.source.unwrap_or(NOBODY),
         }
     }
 
