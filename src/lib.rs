@@ -29,7 +29,7 @@
 //! | floor | modules |
 //! |---|---|
 //! | 8 | [`cli`] |
-//! | 7 | [`bench`], [`check`], [`inspect`] |
+//! | 7 | [`mod@bench`], [`check`], [`inspect`] |
 //! | 6 | [`sweep`] |
 //! | 5 | [`job`], [`report`], [`export`] |
 //! | 4 | [`render`], [`compare`], [`output`], [`library`] |
