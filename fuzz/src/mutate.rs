@@ -3,6 +3,8 @@
 use libfuzzer_sys::fuzzer_mutate;
 use serde_json::{Map, Value, json};
 
+use crate::glb::pack;
+
 /// Numbers at which things change.
 const NUMBERS: [f64; 20] = [
     0.0,
@@ -108,22 +110,6 @@ fn split(bytes: &[u8]) -> Option<(Value, Vec<u8>)> {
     let length = u32::from_le_bytes(bytes.get(12..16)?.try_into().ok()?) as usize;
     let json = serde_json::from_slice(bytes.get(20..20usize.checked_add(length)?)?).ok()?;
     Some((json, bytes.get(28 + length..).unwrap_or_default().to_vec()))
-}
-
-fn pack(json: &Value, bin: &[u8]) -> Vec<u8> {
-    let pad = |mut bytes: Vec<u8>, with: u8| {
-        bytes.resize(bytes.len().next_multiple_of(4), with);
-        bytes
-    };
-    let (json, bin) = (pad(json.to_string().into_bytes(), b' '), pad(bin.to_vec(), 0));
-    let mut out = b"glTF\x02\0\0\0".to_vec();
-    out.extend((28 + json.len() as u32 + bin.len() as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", json), (b"BIN\0", bin)] {
-        out.extend((chunk.len() as u32).to_le_bytes());
-        out.extend(kind);
-        out.extend(chunk);
-    }
-    out
 }
 
 /// Changes one value somewhere in `json`.

@@ -5,6 +5,8 @@ mod animation;
 mod compressed;
 mod corpus;
 mod extensions;
+#[path = "../common/glb.rs"]
+mod glb;
 mod hostile;
 #[path = "../common/outside.rs"]
 mod outside;

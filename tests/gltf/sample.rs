@@ -7,6 +7,8 @@ use std::path::Path;
 use pipeline::import::{GltfError, ImportError, ImportOptions, Imported, import_bytes};
 use serde_json::{Value, json};
 
+use crate::glb::pack;
+
 /// A binary chunk with its views and accessors.
 #[derive(Default)]
 pub(crate) struct Bin {
@@ -54,23 +56,6 @@ pub(crate) fn glb(mut json: Value, bin: &Bin) -> Vec<u8> {
     json["bufferViews"] = json!(bin.views);
     json["accessors"] = json!(bin.accessors);
     pack(&json, &bin.bytes)
-}
-
-/// A GLB of two chunks.
-pub(crate) fn pack(json: &Value, bin: &[u8]) -> Vec<u8> {
-    let pad = |mut bytes: Vec<u8>, with: u8| {
-        bytes.resize(bytes.len().next_multiple_of(4), with);
-        bytes
-    };
-    let (json, bin) = (pad(json.to_string().into_bytes(), b' '), pad(bin.to_vec(), 0));
-    let mut out = b"glTF\x02\0\0\0".to_vec();
-    out.extend((28 + json.len() as u32 + bin.len() as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", json), (b"BIN\0", bin)] {
-        out.extend((chunk.len() as u32).to_le_bytes());
-        out.extend(kind);
-        out.extend(chunk);
-    }
-    out
 }
 
 /// A unit square in the plane z = 0 with every attribute.

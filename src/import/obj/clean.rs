@@ -361,18 +361,17 @@ impl Faces<'_> {
 
     /// Adds a face to its group.
     fn write(&mut self, line: u32, corners: &[Corner]) {
-        if let Some(smoothing) = self.smoothing {
+        let smooth = self.smoothing.map(|smoothing| {
             let positions: Vec<usize> = corners.iter().map(|corner| corner.position).collect();
-            self.smooth.add(&positions, &self.vertices.points, smoothing);
-        }
+            self.smooth.add(&positions, &self.vertices.points, smoothing)
+        });
         let group = self.group(line);
         let faces = &mut self.out.groups[group].faces;
         faces.push('f');
-        for corner in corners {
-            let smooth = || {
-                self.smoothing.map(|s| self.vertices.counts.normals + self.smooth.index(corner.position, s))
-            };
-            let normal = corner.normal.or_else(smooth);
+        for (i, corner) in corners.iter().enumerate() {
+            // The stream has the normals that are made behind the file's own.
+            let made = || smooth.as_ref().map(|places| self.vertices.counts.normals + places[i]);
+            let normal = corner.normal.or_else(made);
             // The first coordinate and normal of the stream stand for missing ones.
             let shifted = |i: Option<usize>| i.map_or(1, |i| i + 2);
             let _ = write!(faces, " {}/{}/{}", corner.position + 1, shifted(corner.uv), shifted(normal));

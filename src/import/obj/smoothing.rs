@@ -18,28 +18,31 @@ pub(super) struct SmoothNormals {
 }
 
 impl SmoothNormals {
-    /// The index, from 0 in the order of first appearance, of the normal at `position` in `group`.
-    pub(super) fn index(&mut self, position: usize, group: u32) -> usize {
+    /// The index of the normal at `position` in `group`.
+    fn index(&mut self, position: usize, group: u32) -> usize {
         *self.places.entry((position, group)).or_insert_with(|| {
             self.sums.push(DVec3::ZERO);
             self.sums.len() - 1
         })
     }
 
-    /// Adds a face of `group` with these corners, indices into `positions`.
-    pub(super) fn add(&mut self, corners: &[usize], positions: &[Vec3], group: u32) {
+    /// Adds a face of `group` with these corners, indices into `positions`; returns the indices of its corners' normals, from 0 in the
+    /// order of first appearance.
+    pub(super) fn add(&mut self, corners: &[usize], positions: &[Vec3], group: u32) -> Vec<usize> {
         let points: Vec<Vec3> = corners.iter().map(|&i| positions[i]).collect();
         // Relative to the first corner, so that a small face far from the origin keeps its digits.
         let local: Vec<Vec3> = points.iter().map(|&p| p - points[0]).collect();
         let normal = polygon::newell(&local).normalize_or_zero();
         let n = corners.len();
-        for (i, &corner) in corners.iter().enumerate() {
+        let mut add = |(i, &corner): (usize, &usize)| {
             let edge = |to: usize| (points[to] - points[i]).as_dvec3();
             let (before, after) = (edge((i + n - 1) % n), edge((i + 1) % n));
             let angle = Real::atan2(before.cross(after).length(), before.dot(after));
             let place = self.index(corner, group);
             self.sums[place] += normal * angle;
-        }
+            place
+        };
+        corners.iter().enumerate().map(&mut add).collect()
     }
 
     /// All normals by index, not normalised; `None` where faces without area or of opposite directions meet.
