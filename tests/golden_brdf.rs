@@ -1,6 +1,6 @@
 //! The Disney BRDF against golden values: those of a reference evaluation, named by the environment, and a set of our own.
 
-#![allow(clippy::print_stderr, reason = "a skipped test says so, and the errors found are worth reading")]
+#![expect(clippy::print_stderr, reason = "a skipped test says so, and the errors found are worth reading")]
 
 #[path = "common/outside.rs"]
 mod outside;

@@ -13,7 +13,7 @@ pub use mtl::{MtlMap, MtlMaterial, MtlSlot};
 
 /// A material as its file describes it.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(clippy::large_enum_variant, reason = "a scene has few materials, and they are read once")]
+#[expect(clippy::large_enum_variant, reason = "a scene has few materials, and they are read once")]
 pub enum SourceMaterial {
     /// glTF 2.0.
     Gltf(GltfMaterial),
