@@ -14,25 +14,24 @@ type Recipe = (TextureId, TextureChannel, Curve, u32);
 /// `scene` with Disney's anisotropy for glTF's where `keeps_anisotropy` says nothing else, and with new textures for the scalars that
 /// `wants` names: each holds what the curve makes of the factor times the channel, in 16 bits.
 pub(super) fn bake(
-    scene: &Scene<Material>,
+    mut scene: Scene<Material>,
     keeps_anisotropy: bool,
     wants: impl Fn(Parameter, &TextureMap) -> bool,
     notes: &mut Vec<Note>,
 ) -> Scene<Material> {
-    let mut baked = scene.clone();
     let mut known: Vec<(Recipe, TextureId)> = Vec::new();
-    for index in 0..baked.materials.len() {
-        let name = baked.materials[index].name.clone();
+    for index in 0..scene.materials.len() {
+        let name = scene.materials[index].name.clone();
         let mut tell = |field: &str, reason: &str| {
             let (material, field, reason) = (name.clone(), field.to_owned(), reason.to_owned());
             notes.push(Note { material, field, quality: Quality::Approximated, reason });
         };
-        if !keeps_anisotropy && baked.materials[index].item.anisotropy.is_some() {
-            baked.materials[index].item = scene.with_mean_anisotropy(&scene.materials[index].item);
+        if !keeps_anisotropy && scene.materials[index].item.anisotropy.is_some() {
+            scene.materials[index].item = scene.with_mean_anisotropy(&scene.materials[index].item);
             tell("anisotropic", "the mean of its texture, along the tangent");
         }
         for parameter in Parameter::ALL {
-            let Param::Texture { map, factor } = baked.materials[index].item.scalar(parameter).clone() else {
+            let Param::Texture { map, factor } = scene.materials[index].item.scalar(parameter).clone() else {
                 continue;
             };
             if !wants(parameter, &map) {
@@ -42,18 +41,18 @@ pub(super) fn bake(
             let texture = match known.iter().find(|(of, _)| *of == recipe) {
                 Some(&(_, texture)) => texture,
                 None => {
-                    let texture = add(&mut baked, &map, factor, parameter);
+                    let texture = add(&mut scene, &map, factor, parameter);
                     known.push((recipe, texture));
                     texture
                 }
             };
             let (channel, curve) = (TextureChannel::R, Curve::Linear);
             let map = TextureMap { texture, channel, curve, ..map };
-            *baked.materials[index].item.scalar_mut(parameter) = Param::Texture { map, factor: 1.0 };
+            *scene.materials[index].item.scalar_mut(parameter) = Param::Texture { map, factor: 1.0 };
             tell(parameter.name(), "worked out for each texel, and read between texels");
         }
     }
-    baked
+    scene
 }
 
 /// A new texture of what `map` and `factor` give `parameter`.
@@ -96,7 +95,7 @@ mod tests {
         material.anisotropy = Some(AnisotropyMap { map: None, strength: 0.5 });
         scene.materials = vec![Named::new("a", material.clone()), Named::new("b", material)];
         let mut notes = Vec::new();
-        let baked = bake(&scene, false, |_, map| map.curve != Curve::Linear, &mut notes);
+        let baked = bake(scene, false, |_, map| map.curve != Curve::Linear, &mut notes);
         assert_eq!((baked.images.len(), baked.textures.len()), (2, 2), "baked once");
         assert_eq!(notes.len(), 4);
         let image = &baked.images[1];

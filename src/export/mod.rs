@@ -129,7 +129,7 @@ pub fn export(
     let converted = to_disney(imported.scene, convert_options);
     let materials = converted.scene.materials.len();
     let mut notes = converted.notes;
-    let scene = &as_read_by(target, &converted.scene, &mut notes);
+    let scene = &as_read_by(target, converted.scene, &mut notes);
     let name = source.file_name().unwrap_or_default().to_string_lossy();
     let mut textures = TextureFiles::new(scene);
     // Images that the target writes itself.
@@ -181,7 +181,7 @@ pub fn export(
 }
 
 /// The scene with textures that the target can read. A library says all that a material has, a config root has no textures.
-fn as_read_by(target: Target, scene: &Scene<Material>, notes: &mut Vec<Note>) -> Scene<Material> {
+fn as_read_by(target: Target, scene: Scene<Material>, notes: &mut Vec<Note>) -> Scene<Material> {
     let keeps_anisotropy = !matches!(target, Target::Mtlx | Target::Mitsuba);
     let wants = |parameter: Parameter, map: &TextureMap| {
         let is_curved = map.curve != Curve::Linear;
