@@ -10,15 +10,13 @@ pub fn concentric_disk<F: Real>(u: [F; 2]) -> [F; 2] {
     if x == F::ZERO && y == F::ZERO {
         return [F::ZERO, F::ZERO];
     }
-    let half = F::of(0.5);
-    // The angle is π/4·y/x from the x axis in two of the square's quarters, π/4·x/y from the y axis in the others.
-    if x.abs() > y.abs() {
-        let (sin, cos) = (half * (y / x)).sin_cos_quarter();
-        [x * cos, x * sin]
-    } else {
-        let (sin, cos) = (half * (x / y)).sin_cos_quarter();
-        [y * sin, y * cos]
-    }
+    // The angle is π/4·y/x from the x axis in two of the square's quarters, π/4·x/y from the y axis in the others. Chosen without a
+    // branch: the quarters are random.
+    let along_x = x.abs() > y.abs();
+    let (radius, across) = if along_x { (x, y) } else { (y, x) };
+    let (sin, cos) = (F::of(0.5) * (across / radius)).sin_cos_quarter();
+    let (near, far) = (radius * cos, radius * sin);
+    if along_x { [near, far] } else { [far, near] }
 }
 
 /// A direction of the upper hemisphere, by the cosine; its pdf is [`cosine_hemisphere_pdf`].

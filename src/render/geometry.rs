@@ -1,7 +1,9 @@
 //! All triangles of a scene in world space, with the way back from a triangle to its mesh.
 
-use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
+
+use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::RenderError;
 use super::offset::Departure;
@@ -17,8 +19,7 @@ use crate::scene::{MaterialId, Mesh, Scene};
 pub struct Geometry {
     pub(super) bvh: Bvh,
     origin: Vec3,
-    /// Positions relative to `origin`, by triangle.
-    vertices: Vec<[Vec3; 3]>,
+    triangles: Vec<Triangle>,
     /// The instance and the triangle's index in its mesh.
     origins: Vec<(u32, u32)>,
     instances: Vec<PlacedMesh>,
@@ -36,13 +37,45 @@ struct PlacedMesh {
     handedness: f32,
 }
 
+/// A triangle, and what rays that meet it ask for each time: worked out once, and one cache line long.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Triangle {
+    /// Positions relative to the geometry's origin.
+    vertices: [Vec3; 3],
+    /// The unit normal of the front side, right to the last digits even for needles: in f64 the differences and products of f32
+    /// coordinates are exact. 0 where the triangle has no area.
+    normal: Vec3,
+    /// Of the corners above the opposite edges, in metres: 0 where the triangle has no area.
+    heights: [f32; 3],
+    /// The largest coordinate of an edge.
+    extent: f32,
+}
+
+impl Triangle {
+    /// `handedness` is -1 where the front is on the other side than the winding says.
+    fn new(vertices: [Vec3; 3], handedness: f32) -> Self {
+        let [a, b, c] = vertices.map(|v| v.as_dvec3());
+        let edges = [c - b, c - a, b - a];
+        let area_vector = edges[2].cross(edges[1]);
+        let twice_area = area_vector.length();
+        let height = |edge: DVec3| if twice_area > 0.0 { twice_area / edge.length() } else { 0.0 };
+        Self {
+            vertices,
+            normal: area_vector.try_normalize().map_or(Vec3::ZERO, |n| n.as_vec3() * handedness),
+            heights: edges.map(|edge| height(edge) as f32),
+            extent: edges.map(|edge| edge.abs().max_element() as f32).into_iter().fold(0.0, f32::max),
+        }
+    }
+}
+
 /// The corner data of a hit triangle, interpolated on demand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePoint<'a> {
     placed: &'a PlacedMesh,
     corners: [usize; 3],
     barycentric: [f32; 3],
-    world: [Vec3; 3],
+    triangle: &'a Triangle,
 }
 
 impl Geometry {
@@ -80,7 +113,14 @@ impl Geometry {
                 handedness: if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
             });
         }
-        Ok(Self { bvh: Bvh::build(&vertices)?, origin, vertices, origins, instances, radius })
+        let triangles = vertices
+            .par_iter()
+            .zip(&origins)
+            .map(|(&vertices, &(instance, _))| {
+                Triangle::new(vertices, instances[instance as usize].handedness)
+            })
+            .collect();
+        Ok(Self { bvh: Bvh::build(&vertices)?, origin, triangles, origins, instances, radius })
     }
 
     /// Where in the world the positions of rays and hits are 0.
@@ -100,7 +140,7 @@ impl Geometry {
 
     /// The number of triangles, instances counted.
     pub fn triangle_count(&self) -> usize {
-        self.vertices.len()
+        self.triangles.len()
     }
 
     /// -1 where a triangle's front is on the other side than its winding says.
@@ -115,7 +155,7 @@ impl Geometry {
 
     /// World positions, in the order that barycentric coordinates count.
     pub(super) fn vertices(&self, triangle: u32) -> [Vec3; 3] {
-        self.vertices[triangle as usize]
+        self.triangles[triangle as usize].vertices
     }
 
     /// Triangles with their instance's material.
@@ -141,7 +181,7 @@ impl Geometry {
             placed,
             corners: placed.mesh.triangles[index as usize].map(|c| c as usize),
             barycentric,
-            world: self.vertices[triangle as usize],
+            triangle: &self.triangles[triangle as usize],
         }
     }
 }
@@ -168,48 +208,32 @@ impl TrianglePoint<'_> {
     /// The position, and a bound of how far rays must stay from the plane of its triangle: see the room `offset`.
     #[inline]
     pub(super) fn position(&self) -> (Vec3, f32) {
-        let [a, b, c] = self.world;
+        let [a, b, c] = self.triangle.vertices;
         let (e1, e2) = (b - a, c - a);
         let point = a + (e1 * self.barycentric[1] + e2 * self.barycentric[2]);
-        let extent = e1.abs().max(e2.abs()).max((e2 - e1).abs()).max_element();
-        (point, super::offset::bound(point, extent))
+        (point, super::offset::bound(point, self.triangle.extent))
     }
 
-    /// The unit geometric normal of the front side, right to the last digits even for needles: in f64 the differences and products
-    /// of f32 coordinates are exact. None where the triangle has no area.
+    /// The unit geometric normal of the front side. None where the triangle has no area.
     #[inline]
     pub(super) fn geometric_normal(&self) -> Option<Vec3> {
-        let n = self.area_vector().try_normalize()?;
-        Some(n.as_vec3() * self.placed.handedness)
-    }
-
-    /// Twice the area, along the normal of the winding.
-    #[inline]
-    fn area_vector(&self) -> DVec3 {
-        let [a, b, c] = self.world.map(|v| v.as_dvec3());
-        (b - a).cross(c - a)
+        let normal = self.triangle.normal;
+        (normal != Vec3::ZERO).then_some(normal)
     }
 
     /// From where rays leave the point that `incoming` hit.
     #[inline]
     pub(super) fn departure(&self, geometry: &Geometry, incoming: &Ray, hit: &Hit) -> Departure {
         let (point, error) = self.position();
-        let [a, b, c] = self.world;
-        let [opposite_a, opposite_b, opposite_c] = [c - b, c - a, b - a].map(Vec3::length);
-        let longest = opposite_a.max(opposite_b).max(opposite_c);
-        let area_vector = self.area_vector();
-        let area = area_vector.length() as f32;
+        let [h0, h1, h2] = self.triangle.heights;
         // A triangle thinner than rounding moves its corners has no plane to speak of: any normal is right that faces the viewer.
-        let has_plane = area > super::offset::THINNEST * error * longest;
-        let normal = match area_vector.try_normalize() {
-            Some(n) if has_plane => n.as_vec3() * self.placed.handedness,
-            _ => -incoming.direction,
-        };
+        let has_plane = h0.min(h1).min(h2) > super::offset::THINNEST * error;
+        let normal = if has_plane { self.triangle.normal } else { -incoming.direction };
         let mut departure = Departure::new(hit.triangle, point, error, normal, incoming);
         // A barycentric coordinate is the distance from an edge in heights above it.
-        let [b0, b1, b2] = self.barycentric.map(|b| b * area);
+        let [b0, b1, b2] = self.barycentric;
         let near = super::offset::NEAR * error;
-        if b0 <= near * opposite_a || b1 <= near * opposite_b || b2 <= near * opposite_c {
+        if (b0 * h0).min(b1 * h1).min(b2 * h2) <= near {
             departure.keep_clear(geometry, has_plane);
         }
         departure
@@ -259,7 +283,8 @@ impl TrianglePoint<'_> {
         let uvs = mesh.uvs.get(set as usize)?;
         let [t0, t1, t2] = self.corners.map(|c| uvs[c]);
         let (d1, d2) = (t1 - t0, t2 - t0);
-        let (e1, e2) = (self.world[1] - self.world[0], self.world[2] - self.world[0]);
+        let [a, b, c] = self.triangle.vertices;
+        let (e1, e2) = (b - a, c - a);
         let det = d1.perp_dot(d2);
         let tangent = ((e1 * d2.y - e2 * d1.y) * det.signum()).try_normalize()?;
         // v grows downwards in the image while tangent space has +y up.

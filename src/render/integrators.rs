@@ -63,7 +63,7 @@ fn at_first(
     let mut path = PathSample { rays: 1, ..PathSample::default() };
     if let Some(hit) = next_surface(scene, sampler, 1, ray) {
         let surface = Surface::new(scene, ray, &hit);
-        path.first = Some(first_hit(scene, ray, &surface, surface.shading(scene).as_ref()));
+        path.first = Some(first_hit(scene, ray, &surface, surface.shading(scene, &mut None).as_ref()));
         path.radiance = value(&surface, &mut path.rays);
         inspect(ReplayVertex { point: surface.point.into(), radiance: path.radiance, beta: Rgb::WHITE });
     }
@@ -75,7 +75,7 @@ fn rgb(v: Vec3) -> Rgb {
 }
 
 fn albedo(scene: &Prepared, surface: &Surface<'_>) -> Rgb {
-    surface.material.bsdf(&scene.scene, &surface.at).albedo()
+    surface.material.bsdf(&scene.scene, &surface.at, &mut None).albedo()
 }
 
 fn is_diffuse(scene: &Prepared, triangle: u32) -> bool {
@@ -110,7 +110,8 @@ fn point_light(scene: &Prepared, surface: &Surface<'_>, position: Vec3, energy: 
 /// ∫ Le·V·f/d² over the lights' areas: direct light without the cosines at surface and light. A point light counts with its
 /// intensity; the environment, which has no distance, is left out.
 fn emitter_check(scene: &Prepared, sampler: &Sampler, surface: &Surface<'_>, rays: &mut u64) -> Rgb {
-    let Some(shading) = surface.shading(scene) else { return Rgb::BLACK };
+    let mut varying = None;
+    let Some(shading) = surface.shading(scene, &mut varying) else { return Rgb::BLACK };
     let [u_light, u0, u1, _] = sampler.set(1, Purpose::Light);
     let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) else { return Rgb::BLACK };
     let cos_light = match sample.place {
@@ -158,7 +159,8 @@ fn whitted(
         if vertex == 1 {
             path.radiance += beta * surface.unlit(scene);
         }
-        let shading = surface.shading(scene);
+        let mut varying = None;
+        let shading = surface.shading(scene, &mut varying);
         if path.first.is_none() {
             path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
         }

@@ -198,32 +198,17 @@ impl PreparedMaterial {
         }
     }
 
-    /// The BSDF at a point.
+    /// The BSDF at a point; one that varies is worked out into `varying`, and one that is the same everywhere isn't copied.
     #[inline]
-    pub(super) fn bsdf(&self, scene: &Scene, at: &TrianglePoint<'_>) -> Bsdf {
+    pub(super) fn bsdf<'s>(
+        &'s self,
+        scene: &Scene,
+        at: &TrianglePoint<'_>,
+        varying: &'s mut Option<Bsdf>,
+    ) -> &'s Bsdf {
         match &self.bsdf {
-            Scattering::Constant(bsdf) => **bsdf,
-            Scattering::Varying(material) => {
-                let mut base_color = read_color(scene, &material.base_color, at);
-                if material.vertex_color {
-                    let c = at.color();
-                    base_color *= Rgb::new(c.x, c.y, c.z);
-                }
-                // Products of factors, textures and vertex colours may leave the range by their own rounding or by intent.
-                let base_color = base_color.map(|v| v.clamp(0.0, 1.0));
-                let color = |c: &Param<Rgb>| read_color(scene, c, at).map(|v| v.clamp(0.0, 1.0));
-                let read = |p: Parameter| read_scalar(scene, material.scalar(p), at).clamp(p.min(), p.max());
-                let Some(anisotropy) = &material.anisotropy else {
-                    return scatter(material, base_color, color, read);
-                };
-                let (strength, _) = read_anisotropy(scene, anisotropy, at);
-                let disney = AnisotropyMap::disney(read(Parameter::Roughness), strength);
-                scatter(material, base_color, color, |p| match p {
-                    Parameter::Roughness => disney.roughness,
-                    Parameter::Anisotropic => disney.anisotropic.min(p.max()),
-                    _ => read(p),
-                })
-            }
+            Scattering::Constant(bsdf) => bsdf,
+            Scattering::Varying(material) => varying.insert(bsdf_at(material, scene, at)),
         }
     }
 
@@ -276,6 +261,30 @@ impl PreparedMaterial {
         let mapped = frame.tangent * x + frame.bitangent * (y * sign) + front * z;
         mapped.try_normalize().map_or(normal, |n| n * side)
     }
+}
+
+/// The BSDF of a material that varies, at a point.
+#[inline]
+fn bsdf_at(material: &Material, scene: &Scene, at: &TrianglePoint<'_>) -> Bsdf {
+    let mut base_color = read_color(scene, &material.base_color, at);
+    if material.vertex_color {
+        let c = at.color();
+        base_color *= Rgb::new(c.x, c.y, c.z);
+    }
+    // Products of factors, textures and vertex colours may leave the range by their own rounding or by intent.
+    let base_color = base_color.map(|v| v.clamp(0.0, 1.0));
+    let color = |c: &Param<Rgb>| read_color(scene, c, at).map(|v| v.clamp(0.0, 1.0));
+    let read = |p: Parameter| read_scalar(scene, material.scalar(p), at).clamp(p.min(), p.max());
+    let Some(anisotropy) = &material.anisotropy else {
+        return scatter(material, base_color, color, read);
+    };
+    let (strength, _) = read_anisotropy(scene, anisotropy, at);
+    let disney = AnisotropyMap::disney(read(Parameter::Roughness), strength);
+    scatter(material, base_color, color, |p| match p {
+        Parameter::Roughness => disney.roughness,
+        Parameter::Anisotropic => disney.anisotropic.min(p.max()),
+        _ => read(p),
+    })
 }
 
 fn scatter(

@@ -132,7 +132,8 @@ pub(super) fn trace(
         }
 
         // Work out how it scatters.
-        let shading = surface.shading(scene);
+        let mut varying = None;
+        let shading = surface.shading(scene, &mut varying);
         if path.first.is_none() {
             path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
         }
@@ -217,7 +218,7 @@ pub(super) fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray
 pub(super) fn direct_light(
     scene: &Prepared,
     surface: &Surface<'_>,
-    shading: &Shading,
+    shading: &Shading<'_>,
     sample: &LightSample,
     strategies: Strategies,
     arrived: Medium,
@@ -290,8 +291,9 @@ fn passing_surface(scene: &Prepared, ray: &Ray, hit: &Hit) -> Rgb {
     if alpha == 0.0 || !material.lets_shadow_rays_pass {
         return absent;
     }
+    let mut varying = None;
     let sheet = Surface::new(scene, ray, hit)
-        .shading(scene)
+        .shading(scene, &mut varying)
         .and_then(|shading| shading.bsdf.straight_transmittance(shading.wo));
     sheet.map_or(absent, |passing| absent + passing * alpha)
 }
@@ -300,7 +302,7 @@ pub(super) fn first_hit(
     scene: &Prepared,
     ray: &Ray,
     surface: &Surface<'_>,
-    shading: Option<&Shading>,
+    shading: Option<&Shading<'_>>,
 ) -> FirstHit {
     FirstHit {
         albedo: shading.map_or(Rgb::BLACK, |s| s.bsdf.albedo()),

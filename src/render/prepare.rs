@@ -11,7 +11,7 @@ use super::medium::Medium;
 use super::range;
 use crate::light::{EmissiveTriangle, EnvironmentLight, Lights};
 use crate::scene::environment::EnvironmentMap;
-use crate::scene::{Camera, Named, Scene};
+use crate::scene::{Camera, MaterialId, Named, Scene};
 use crate::settings::RenderSettings;
 
 /// The size of images where neither settings nor camera say one.
@@ -23,6 +23,8 @@ pub struct Prepared {
     pub(super) scene: Arc<Scene>,
     pub(super) geometry: Arc<Geometry>,
     materials: Vec<PreparedMaterial>,
+    /// The material of each instance.
+    material_of: Vec<MaterialId>,
     pub(super) lights: Lights,
     pub(super) camera: FilmCamera,
     pub(super) filter: FilterSampler,
@@ -71,6 +73,7 @@ impl Prepared {
             camera: film_camera,
             filter: FilterSampler::new(settings.filter, settings.filter_radius),
             settings: settings.clone(),
+            material_of: scene.instances.iter().map(|i| i.material).collect(),
             materials,
             lights,
             width,
@@ -117,8 +120,7 @@ impl Prepared {
 
     #[inline]
     pub(super) fn material_of(&self, triangle: u32) -> &PreparedMaterial {
-        let instance = &self.scene.instances[self.geometry.instance_of(triangle)];
-        &self.materials[instance.material.0 as usize]
+        &self.materials[self.material_of[self.geometry.instance_of(triangle)].0 as usize]
     }
 }
 

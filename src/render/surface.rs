@@ -30,9 +30,9 @@ pub(super) struct Surface<'a> {
 
 /// The local frame of a surface with its BSDF.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shading {
+pub(super) struct Shading<'s> {
     pub(super) frame: Frame,
-    pub(super) bsdf: Bsdf,
+    pub(super) bsdf: &'s Bsdf,
     /// The viewer in the frame.
     pub(super) wo: V3<f32>,
 }
@@ -75,8 +75,14 @@ impl<'a> Surface<'a> {
     /// The shading normal is turned to the viewer's geometric side, except for interfaces, whose inside is a place of its own.
     /// Where it still looks away from the viewer, at silhouettes of smooth meshes, one-sided materials are black, as in Aris;
     /// others fall back to the geometric normal.
+    ///
+    /// A BSDF that varies is kept in `varying`.
     #[inline]
-    pub(super) fn shading(&self, scene: &Prepared) -> Option<Shading> {
+    pub(super) fn shading<'s>(
+        &'s self,
+        scene: &Prepared,
+        varying: &'s mut Option<Bsdf>,
+    ) -> Option<Shading<'s>> {
         let one_sided = self.material.sides == crate::scene::material::Sides::Front;
         let is_interface = self.material.is_interface;
         if one_sided && !self.is_front && !is_interface {
@@ -92,7 +98,7 @@ impl<'a> Surface<'a> {
             frame = Frame::from_normal(self.normal * side);
         }
         let wo = frame.local_from_world(self.wo);
-        Some(Shading { frame, bsdf: self.material.bsdf(&scene.scene, &self.at), wo })
+        Some(Shading { frame, bsdf: self.material.bsdf(&scene.scene, &self.at, varying), wo })
     }
 
     /// The shading normal on the front, of two-sided materials on the viewer's side.
