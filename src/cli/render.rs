@@ -4,7 +4,8 @@ mod config_root;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 use self::config_root::{Outputs, Shown};
 use super::progress::Progress;
@@ -12,7 +13,7 @@ use super::reading::{Conversion, Reading};
 use super::{Outcome, Talk, WELL, print};
 use crate::imagefile;
 use crate::import::ArisConfig;
-use crate::job::{self, Build, JobError, LoadedRun, LoadedScene, PlannedJob};
+use crate::job::{self, Build, JobError, LoadedRun, PlannedJob};
 use crate::manifest::edit;
 use crate::output::{stamp, tone};
 use crate::raster::Raster;
@@ -31,7 +32,7 @@ use crate::settings::{Display, Filter, RenderSettings, ToneCurve};
 /// named after the overrides.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline render scenes/shaderball.glb -o ball.png --spp 256 --set material.ball.roughness=0.1\n  pipeline render model.obj -o model.exr --width 800 --set environment.rotation=90\n  pipeline render scenes/shaderball.glb -o normals.png --set render.integrator=normals\n  pipeline render model.glb -o model.exr --materials edited.yaml\n  pipeline render scenes/shaderball.glb --pixel 320,240 --sample 3\n  pipeline render scenes/aris/config scene=cbox integrator=path_mis spp=50 scale=0.5\n  pipeline render scenes/aris/config scene=cbox +scene.camera.config.aperture=0.1 --cfg"
+    after_help = "Examples:\n  pipeline render scenes/shaderball.glb -o ball.exr\n  pipeline render scenes/shaderball.glb -o ball.png --spp 256 --set material.ball.roughness=0.1\n  pipeline render model.obj -o model.exr --width 800 --set environment.rotation=90\n  pipeline render scenes/shaderball.glb -o normals.png --set render.integrator=normals\n  pipeline render model.glb -o model.exr --materials edited.yaml\n  pipeline render scenes/cornell.obj -o cornell.exr --error 0.005\n  pipeline render scenes/cornell.obj -o cornell.png --time-limit 10\n  pipeline render scenes/shaderball.glb --pixel 320,240 --sample 3\n  pipeline render scenes/aris/config scene=cbox integrator=path_mis spp=50 scale=0.5\n  pipeline render scenes/aris/config scene=cbox +scene.camera.config.aperture=0.1 --cfg"
 )]
 pub(super) struct Arguments {
     /// The scene, or the folder of a config root.
@@ -52,6 +53,14 @@ pub(super) struct Arguments {
     /// Samples a pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16_777_216))]
     spp: Option<u32>,
+    /// The error at which to stop, as `pipeline bench` measures it: 0.01 is 10% noise. --spp is then the most samples there may be,
+    /// 65536 where absent.
+    #[arg(long, value_name = "ERROR", value_parser = parse_error)]
+    error: Option<f32>,
+    /// Stop sampling after so many seconds. --spp is then the most samples there may be, 65536 where absent. The result depends on the
+    /// machine.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    time_limit: Option<Duration>,
     /// Columns.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=65_536))]
     width: Option<u32>,
@@ -97,6 +106,17 @@ pub(super) struct Arguments {
 /// A value of an enum by its name in files.
 pub(super) fn parse_enum<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     serde_json::from_value(serde_json::Value::String(text.to_owned())).map_err(|error| error.to_string())
+}
+
+fn parse_error(text: &str) -> Result<f32, String> {
+    let error = text.parse().ok().filter(|error| *error > 0.0 && *error <= 1.0);
+    error.ok_or_else(|| "a number above 0 and at most 1 is expected, such as 0.01".to_owned())
+}
+
+fn parse_seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0);
+    let limit = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    limit.ok_or_else(|| "a number of seconds above 0 is expected, such as 30".to_owned())
 }
 
 fn parse_pixel(text: &str) -> Result<(u32, u32), String> {
@@ -149,8 +169,8 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         }
         _ => None,
     };
-    let mut rendered = render_with_progress(&prepared, &planned, &loaded, talk)?;
-    stamp(&mut rendered, &planned.provenance(&build));
+    let mut rendered = render_with_progress(&prepared, &planned, arguments.time_limit, talk)?;
+    stamp(&mut rendered, &planned.provenance(&build, arguments.time_limit));
     if let Some(config) = &config {
         config_root::stamp_config(&mut rendered, config);
     }
@@ -168,9 +188,13 @@ fn with_hint(error: JobError) -> Box<dyn std::error::Error> {
     }
 }
 
+/// Samples a pixel where an error or a time ends the render, and nobody says how many there may be.
+const MOST_SAMPLES: u32 = 65_536;
+
 /// The job that the arguments describe: what they say, and else what `base` is.
 fn described(arguments: &Arguments, config: Option<&ArisConfig>, base: RenderSettings) -> Job {
-    let spp = arguments.spp.unwrap_or(base.spp);
+    let ends_otherwise = arguments.error.is_some() || arguments.time_limit.is_some();
+    let spp = arguments.spp.unwrap_or(if ends_otherwise { MOST_SAMPLES } else { base.spp });
     let filter = match (arguments.filter, config) {
         (Some(filter), _) => filter,
         // Aris' single sample is not moved.
@@ -187,6 +211,7 @@ fn described(arguments: &Arguments, config: Option<&ArisConfig>, base: RenderSet
         width,
         height,
         spp,
+        error: arguments.error.or(base.error),
         filter,
         seed: arguments.seed.unwrap_or(base.seed),
         max_depth: arguments.max_depth.unwrap_or(base.max_depth),
@@ -208,11 +233,11 @@ fn described(arguments: &Arguments, config: Option<&ArisConfig>, base: RenderSet
 fn render_with_progress(
     prepared: &Prepared,
     planned: &PlannedJob,
-    loaded: &LoadedScene,
+    time_limit: Option<Duration>,
     talk: Talk,
 ) -> Result<Raster, RenderError> {
     let start = Instant::now();
-    let control = Arc::new(Control::default());
+    let control = Arc::new(Control { time_limit, ..Control::default() });
     let mut progress = Progress::new(1, talk);
     progress.follow(&planned.job.name, &control);
     let rendered = render(prepared, &control)?;
@@ -221,9 +246,10 @@ fn render_with_progress(
     let (width, height) = prepared.size();
     let counts = &rendered.counts;
     talk.say(&format!(
-        "{width} × {height}, {} samples a pixel, {} triangles, {seconds:.1} s, {:.2} M rays/s",
-        planned.settings.spp,
-        loaded.geometry.triangle_count(),
+        "{width} × {height}, {} samples a pixel{}, {} triangles, {seconds:.1} s, {:.2} M rays/s",
+        counts.paths / (u64::from(width) * u64::from(height)),
+        if counts.paths == control.total_paths.load(Ordering::Relaxed) { "" } else { " on average" },
+        counts.triangles,
         counts.rays as f64 * 1e-6 / seconds.max(1e-9),
     ));
     let skipped = prepared.skipped();

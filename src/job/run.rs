@@ -5,7 +5,7 @@ use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::identity::identify;
 use super::{Build, JobError, LoadedScene};
@@ -38,8 +38,8 @@ pub struct PlannedJob {
 }
 
 impl PlannedJob {
-    /// What its image tells about its origin.
-    pub fn provenance<'a>(&'a self, build: &'a Build) -> Provenance<'a> {
+    /// What its image tells about its origin; with a limit of time, which the render was told.
+    pub fn provenance<'a>(&'a self, build: &'a Build, time_limit: Option<Duration>) -> Provenance<'a> {
         Provenance {
             identity: &self.identity,
             key: &self.key,
@@ -47,6 +47,7 @@ impl PlannedJob {
             settings: &self.settings,
             build: build.version,
             feature_level: build.feature_level,
+            time_limit,
         }
     }
 }
@@ -215,7 +216,7 @@ fn attempt(
     record.counts = counts;
 
     let start = Instant::now();
-    stamp(&mut raster, &planned.provenance(build));
+    stamp(&mut raster, &planned.provenance(build, None));
     let encoded = imagefile::encode_exr(&raster)?;
     let path = image_path(&destination.folder, &planned.job.name);
     imagefile::write_whole(&path, &encoded.bytes)?;

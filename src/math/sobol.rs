@@ -43,7 +43,9 @@ const fn directions() -> [[u32; 4]; 32] {
     v
 }
 
-/// The contribution of every value of every nibble of the index: eight look-ups instead of 32 conditional additions.
+/// What every value of every nibble of the index contributes: eight look-ups instead of 32 conditional additions.
+///
+/// Index and points are both kept with their bits in reverse, as the hash below takes and gives them.
 const NIBBLES: [[[u32; 4]; 16]; 8] = nibbles();
 
 const fn nibbles() -> [[[u32; 4]; 16]; 8] {
@@ -57,7 +59,7 @@ const fn nibbles() -> [[[u32; 4]; 16]; 8] {
                 if (value >> bit) & 1 == 1 {
                     let mut d = 0;
                     while d < 4 {
-                        table[n][value][d] ^= DIRECTIONS[4 * n + bit][d];
+                        table[n][value][d] ^= DIRECTIONS[31 - (4 * n + bit)][d].reverse_bits();
                         d += 1;
                     }
                 }
@@ -70,12 +72,12 @@ const fn nibbles() -> [[[u32; 4]; 16]; 8] {
     table
 }
 
-/// The unscrambled point of an index, as fixed-point fractions.
+/// The unscrambled point of an index, as fixed-point fractions; the bits of index and fractions in reverse.
 #[inline]
-fn sobol4(index: u32) -> [u32; 4] {
+fn sobol4_reversed(reversed_index: u32) -> [u32; 4] {
     let mut point = [0u32; 4];
     for (n, table) in NIBBLES.iter().enumerate() {
-        let part = table[(index >> (4 * n)) as usize & 15];
+        let part = table[(reversed_index >> (4 * n)) as usize & 15];
         for d in 0..4 {
             point[d] ^= part[d];
         }
@@ -83,7 +85,8 @@ fn sobol4(index: u32) -> [u32; 4] {
     point
 }
 
-/// Flips each bit depending on the seed and the bits below it.
+/// Flips each bit depending on the seed and the bits below it: on reversed bits, Owen's nested uniform scramble in base 2, which flips
+/// each bit depending on the bits above it.
 #[inline]
 const fn laine_karras(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -91,12 +94,6 @@ const fn laine_karras(mut x: u32, seed: u32) -> u32 {
     x = x.wrapping_mul((seed >> 16) | 1);
     x ^= x.wrapping_mul(0x0552_6c56);
     x ^ x.wrapping_mul(0x53a2_2864)
-}
-
-/// Owen's nested uniform scramble in base 2: flips each bit depending on the seed and the bits above it.
-#[inline]
-const fn owen_scramble(x: u32, seed: u32) -> u32 {
-    laine_karras(x.reverse_bits(), seed).reverse_bits()
 }
 
 /// The random numbers of one camera path: a pure function of (seed, pixel, sample index, path vertex, dimension).
@@ -145,14 +142,12 @@ impl Sampler {
 
     #[inline]
     fn numbers(&self, set: u64) -> [f32; 4] {
-        let index = owen_scramble(self.index, set as u32);
-        let mut seed = set >> 32;
-        let mut numbers = [0.0; 4];
-        for (number, x) in numbers.iter_mut().zip(sobol4(index)) {
-            seed = mix64(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
-            *number = unit_f32(owen_scramble(x, seed as u32));
-        }
-        numbers
+        let point = sobol4_reversed(laine_karras(self.index.reverse_bits(), set as u32));
+        // Two words of 64 bits hold four seeds.
+        let first = mix64((set >> 32).wrapping_add(0x9e37_79b9_7f4a_7c15));
+        let second = mix64(first.wrapping_add(0x9e37_79b9_7f4a_7c15));
+        let seeds = [first as u32, (first >> 32) as u32, second as u32, (second >> 32) as u32];
+        std::array::from_fn(|d| unit_f32(laine_karras(point[d], seeds[d]).reverse_bits()))
     }
 }
 

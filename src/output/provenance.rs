@@ -1,5 +1,7 @@
 //! Where an image comes from, in its header. No time of day and no machine: the same job writes the same bytes.
 
+use std::time::Duration;
+
 use crate::raster::{Attribute, Raster};
 use crate::record::Job;
 use crate::settings::{Integrator, RenderSettings};
@@ -19,6 +21,8 @@ pub struct Provenance<'a> {
     pub build: &'a str,
     /// The processor features that the code was compiled for.
     pub feature_level: &'a str,
+    /// When the render was to stop, if the machine's speed decided about samples: then there is no identity, nor a key.
+    pub time_limit: Option<Duration>,
 }
 
 impl Provenance<'_> {
@@ -50,6 +54,14 @@ pub fn stamp(raster: &mut Raster, provenance: &Provenance<'_>) {
         // 64 bits do not fit into EXR's integers.
         ("pipeline:seed", text(&settings.seed.to_string())),
     ];
+    let ends = [
+        ("pipeline:error", settings.error.map(Attribute::Float)),
+        ("pipeline:time_limit", provenance.time_limit.map(|limit| Attribute::Float(limit.as_secs_f32()))),
+    ];
+    let ends = ends.into_iter().filter_map(|(name, value)| Some((name, value?)));
+    let is_known =
+        |name: &str| provenance.time_limit.is_none() || !matches!(name, "pipeline:identity" | "pipeline:key");
+    let attributes: Vec<_> = attributes.into_iter().filter(|(name, _)| is_known(name)).chain(ends).collect();
     for layer in &mut raster.layers {
         layer.attributes.extend(attributes.iter().map(|(name, value)| ((*name).to_owned(), value.clone())));
     }

@@ -73,7 +73,8 @@ impl Triangle {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePoint<'a> {
     placed: &'a PlacedMesh,
-    corners: [usize; 3],
+    /// In its mesh.
+    index: u32,
     barycentric: [f32; 3],
     triangle: &'a Triangle,
 }
@@ -177,12 +178,7 @@ impl Geometry {
     pub(super) fn point_on(&self, triangle: u32, barycentric: [f32; 3]) -> TrianglePoint<'_> {
         let (instance, index) = self.origins[triangle as usize];
         let placed = &self.instances[instance as usize];
-        TrianglePoint {
-            placed,
-            corners: placed.mesh.triangles[index as usize].map(|c| c as usize),
-            barycentric,
-            triangle: &self.triangles[triangle as usize],
-        }
+        TrianglePoint { placed, index, barycentric, triangle: &self.triangles[triangle as usize] }
     }
 }
 
@@ -222,7 +218,7 @@ impl TrianglePoint<'_> {
     }
 
     /// From where rays leave the point that `incoming` hit.
-    #[inline]
+    #[inline(always)]
     pub(super) fn departure(&self, geometry: &Geometry, incoming: &Ray, hit: &Hit) -> Departure {
         let (point, error) = self.position();
         let [h0, h1, h2] = self.triangle.heights;
@@ -255,7 +251,7 @@ impl TrianglePoint<'_> {
     pub(super) fn uv(&self, set: u32) -> Vec2 {
         let Some(uvs) = self.placed.mesh.uvs.get(set as usize) else { return Vec2::ZERO };
         let [b0, b1, b2] = self.barycentric;
-        let [c0, c1, c2] = self.corners;
+        let [c0, c1, c2] = self.corners();
         uvs[c0] * b0 + uvs[c1] * b1 + uvs[c2] * b2
     }
 
@@ -267,7 +263,7 @@ impl TrianglePoint<'_> {
             return Vec4::ONE;
         }
         let [b0, b1, b2] = self.barycentric;
-        let [c0, c1, c2] = self.corners;
+        let [c0, c1, c2] = self.corners();
         colors[c0] * b0 + colors[c1] * b1 + colors[c2] * b2
     }
 
@@ -278,10 +274,10 @@ impl TrianglePoint<'_> {
         if !mesh.tangents.is_empty() {
             let object = self.interpolate(|c| mesh.tangents[c].truncate());
             let world = self.placed.world_from_object.transform_vector3(object).try_normalize()?;
-            return Some((world, mesh.tangents[self.corners[0]].w * self.placed.handedness));
+            return Some((world, mesh.tangents[self.corners()[0]].w * self.placed.handedness));
         }
         let uvs = mesh.uvs.get(set as usize)?;
-        let [t0, t1, t2] = self.corners.map(|c| uvs[c]);
+        let [t0, t1, t2] = self.corners().map(|c| uvs[c]);
         let (d1, d2) = (t1 - t0, t2 - t0);
         let [a, b, c] = self.triangle.vertices;
         let (e1, e2) = (b - a, c - a);
@@ -294,6 +290,13 @@ impl TrianglePoint<'_> {
     #[inline]
     fn interpolate(&self, corner: impl Fn(usize) -> Vec3) -> Vec3 {
         let [b0, b1, b2] = self.barycentric;
-        corner(self.corners[0]) * b0 + corner(self.corners[1]) * b1 + corner(self.corners[2]) * b2
+        let [c0, c1, c2] = self.corners();
+        corner(c0) * b0 + corner(c1) * b1 + corner(c2) * b2
+    }
+
+    /// The mesh's vertices. Most hits need none of them.
+    #[inline]
+    fn corners(&self) -> [usize; 3] {
+        self.placed.mesh.triangles[self.index as usize].map(|c| c as usize)
     }
 }

@@ -15,6 +15,7 @@ mod path;
 mod prepare;
 mod range;
 mod surface;
+mod tile;
 
 use crate::accel::BuildError;
 

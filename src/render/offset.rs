@@ -10,6 +10,7 @@
 //!
 //! To that the bound adds
 //! - once more 1.74 u·|point|: the plane of a coincident face has corners that were rounded on their own;
+//! - and once more: moving the point rounds its coordinates;
 //! - 4.3 u·extent: a ray from the new origin computes with the corners' distances from it, a difference, a product and a
 //!   difference again in each of two coordinates, and must tell on which side of an edge it passes.
 //!
@@ -34,7 +35,7 @@ use crate::accel::Ray;
 #[inline]
 pub(super) fn bound(point: Vec3, extent: f32) -> f32 {
     const UNIT: f32 = f32::EPSILON * 0.5;
-    4.0 * UNIT * point.abs().max_element() + 12.0 * UNIT * extent
+    6.0 * UNIT * point.abs().max_element() + 12.0 * UNIT * extent
 }
 
 /// An edge closer than so many bounds is near: two faces may meet at 15° before the bound above one of them is behind the other
@@ -48,21 +49,10 @@ pub(super) const THINNEST: f32 = 0.5;
 const ROUNDS: usize = 32;
 const RELAXATION: f64 = 1.5;
 
-/// `point` moved off its surface, to the side of `direction`, by its error and at least to the next float.
-#[inline]
+/// `point` moved off its surface, to the side of `direction`, by its error.
+#[inline(always)]
 pub(super) fn offset(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> Vec3 {
-    let shift = if direction.dot(normal) < 0.0 { normal * -error } else { normal * error };
-    let moved = point + shift;
-    let away = |moved: f32, shift: f32| {
-        if shift > 0.0 {
-            moved.next_up()
-        } else if shift < 0.0 {
-            moved.next_down()
-        } else {
-            moved
-        }
-    };
-    Vec3::new(away(moved.x, shift.x), away(moved.y, shift.y), away(moved.z, shift.z))
+    point + normal * error.copysign(direction.dot(normal))
 }
 
 /// A hit point, and where rays start that leave it.
@@ -82,7 +72,7 @@ pub struct Departure {
 }
 
 impl Departure {
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(triangle: u32, point: Vec3, error: f32, normal: Vec3, incoming: &Ray) -> Self {
         let this_side = offset(point, error, normal, -incoming.direction);
         let is_front = incoming.direction.dot(normal) <= 0.0;

@@ -193,6 +193,16 @@ fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), Rende
             expected: "at most 2^26 pixels",
         });
     }
+    if let Some(error) = settings.error {
+        let value = error.to_string();
+        if !(error > 0.0 && error <= 1.0) {
+            return Err(RenderError::Setting { setting: "error", value, expected: "above 0 and at most 1" });
+        }
+        if settings.effective_replicates() < 2 {
+            let expected = "left out with a single replicate, which has no spread to tell an error from";
+            return Err(RenderError::Setting { setting: "error", value, expected });
+        }
+    }
     match settings.filter_radius {
         Some(radius) if !(0.1..=8.0).contains(&radius) => Err(RenderError::Setting {
             setting: "filter_radius",

@@ -39,7 +39,7 @@ pub(super) struct Shading<'s> {
 
 impl<'a> Surface<'a> {
     /// What `ray` (of unit direction) hit.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(scene: &'a Prepared, ray: &Ray, hit: &Hit) -> Self {
         let at = scene.geometry.at(hit);
         let departure = at.departure(&scene.geometry, ray, hit);

@@ -140,6 +140,7 @@ fields! {
         Width "width": "a whole number in [1, 65536]",
         Height "height": "a whole number in [1, 65536]",
         Spp "spp": "a whole number in [1, 16777216]",
+        Error "error": "a number in (0, 1], or false for none",
         Replicates "replicates": "a whole number in [1, 64]",
         Seed "seed": "a whole number in [0, 9007199254740992]",
         MaxDepth "max_depth": "a whole number in [0, 65535]",

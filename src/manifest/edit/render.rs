@@ -15,6 +15,12 @@ pub(super) fn set(settings: &mut RenderSettings, field: RenderField, value: &Val
         RenderField::Width => settings.width = Some(small(1, 65_536)?),
         RenderField::Height => settings.height = Some(small(1, 65_536)?),
         RenderField::Spp => settings.spp = small(1, 1 << 24)?,
+        RenderField::Error => {
+            settings.error = match value {
+                Value::Bool(false) => None,
+                _ => Some(value::number(value, f32::MIN_POSITIVE, 1.0)?),
+            };
+        }
         RenderField::Replicates => settings.replicates = small(1, 64)?,
         RenderField::Seed => settings.seed = value::whole(value, 0, MAX_WHOLE)?,
         RenderField::MaxDepth => settings.max_depth = small(0, 65_535)?,

@@ -59,6 +59,7 @@ pub(in crate::manifest) const HOMES: &[(&str, &[&str])] = &[
             "width",
             "height",
             "spp",
+            "error",
             "replicates",
             "seed",
             "max_depth",

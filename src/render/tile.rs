@@ -1,0 +1,287 @@
+//! The tiles that threads work on: what their pixels' samples add up to, and whether that is enough.
+
+use std::sync::atomic::Ordering;
+
+use glam::{DVec3, Vec3};
+
+use super::film::{Control, sample_pixel};
+use super::{Prepared, RenderError};
+use crate::color::Rgb;
+use crate::record::BadSample;
+
+/// The side of a tile in pixels: small enough to share the work out, large enough that rays stay together and that an error can be told
+/// from its pixels.
+const SIDE: u32 = 16;
+/// How many bad samples are told by name.
+pub(super) const NAMED_BAD_SAMPLES: usize = 16;
+/// The fewest samples a pixel by which an error is judged.
+const FEWEST_JUDGED: u32 = 16;
+/// Added to a square: dark pixels count by their absolute error, bright ones by the relative one.
+const FLOOR: f64 = 0.01;
+
+/// One pixel's result: means over all its samples, where a sample that hits nothing has albedo and normal 0; the depth is the mean
+/// over those that hit something.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pixel {
+    pub(super) beauty: Rgb,
+    /// Of the pixel's mean.
+    pub(super) variance: Rgb,
+    pub(super) albedo: Rgb,
+    pub(super) normal: Vec3,
+    pub(super) depth: f32,
+    pub(super) samples: u32,
+}
+
+/// What a pixel's samples add up to. Sums are f64: thousands of samples must not lose what one of them adds.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    albedo: Rgb<f64>,
+    normal: DVec3,
+    depth: f64,
+    hits: u32,
+}
+
+/// What a replicate's samples of a pixel add up to.
+#[derive(Clone, Copy, Debug, Default)]
+struct Replicate {
+    radiance: Rgb<f64>,
+    count: u32,
+}
+
+/// A rectangle of pixels under way.
+#[derive(Debug)]
+pub(super) struct Tile {
+    x0: u32,
+    y0: u32,
+    width: u32,
+    height: u32,
+    /// Samples a pixel so far.
+    pub(super) samples: u32,
+    /// The settings ask for no more.
+    pub(super) is_finished: bool,
+    pub(super) rays: u64,
+    pub(super) bad_count: u64,
+    /// The first of them.
+    pub(super) bad: Vec<BadSample>,
+    /// By pixel, row by row; empty before the first sample, and again after the last.
+    sums: Vec<Sums>,
+    /// By pixel, all of one pixel's together.
+    replicates: Vec<Replicate>,
+    /// What the sums came to, by pixel; empty before the last sample.
+    pixels: Vec<Pixel>,
+}
+
+/// Numbers of samples, each about twice the last, from as many as there are replicates up to `most`: after each a render may end.
+pub(super) fn levels(replicates: u32, most: u32) -> impl Iterator<Item = u32> {
+    let doubled = std::iter::successors(Some(replicates), |n| n.checked_mul(2));
+    doubled.take_while(move |n| *n < most).chain(std::iter::once(most))
+}
+
+impl Tile {
+    /// The tiles of a picture, row by row.
+    pub(super) fn all(scene: &Prepared) -> Vec<Self> {
+        let (width, height) = scene.size();
+        let starts = |length: u32| (0..length).step_by(SIDE as usize);
+        let tile = |x0: u32, y0: u32| Self {
+            x0,
+            y0,
+            width: SIDE.min(width - x0),
+            height: SIDE.min(height - y0),
+            samples: 0,
+            is_finished: false,
+            rays: 0,
+            bad_count: 0,
+            bad: Vec::new(),
+            sums: Vec::new(),
+            replicates: Vec::new(),
+            pixels: Vec::new(),
+        };
+        starts(height).flat_map(|y0| starts(width).map(move |x0| (x0, y0))).map(|(x, y)| tile(x, y)).collect()
+    }
+
+    /// The number of pixels.
+    pub(super) fn area(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
+    /// Takes all samples that the settings ask for.
+    pub(super) fn finish(&mut self, scene: &Prepared, control: &Control) -> Result<(), RenderError> {
+        let settings = &scene.settings;
+        match settings.error {
+            None => self.sample_up_to(scene, settings.spp, control),
+            Some(_) => levels(settings.effective_replicates(), settings.spp).try_for_each(|samples| {
+                if self.is_finished { Ok(()) } else { self.sample_up_to(scene, samples, control) }
+            }),
+        }
+    }
+
+    /// Goes on until each pixel has `samples` of them, and judges whether that is enough.
+    pub(super) fn sample_up_to(
+        &mut self,
+        scene: &Prepared,
+        samples: u32,
+        control: &Control,
+    ) -> Result<(), RenderError> {
+        let replicates = scene.settings.effective_replicates() as usize;
+        let area = self.area() as usize;
+        self.sums.resize(area, Sums::default());
+        self.replicates.resize(area * replicates, Replicate::default());
+        for pixel in 0..area {
+            if control.stop.load(Ordering::Relaxed) {
+                return Err(RenderError::Cancelled);
+            }
+            self.sample_pixel(scene, pixel, samples, replicates);
+            control.paths.fetch_add(u64::from(samples - self.samples), Ordering::Relaxed);
+        }
+        self.samples = samples;
+        let is_good = |goal: f32| samples >= FEWEST_JUDGED && self.error() <= f64::from(goal);
+        self.is_finished = samples == scene.settings.spp || scene.settings.error.is_some_and(is_good);
+        if self.is_finished {
+            let spared = u64::from(scene.settings.spp - samples) * self.area();
+            control.paths.fetch_add(spared, Ordering::Relaxed);
+            self.settle();
+        }
+        Ok(())
+    }
+
+    fn sample_pixel(&mut self, scene: &Prepared, pixel: usize, samples: u32, replicates: usize) {
+        let (x, y) = self.place(pixel);
+        let mut sums = self.sums[pixel];
+        let sets = &mut self.replicates[pixel * replicates..][..replicates];
+        for sample in self.samples..samples {
+            let path = sample_pixel(scene, x, y, sample, |_| ());
+            self.rays += path.rays;
+            let r = path.radiance;
+            if !r.is_finite() || r.r < 0.0 || r.g < 0.0 || r.b < 0.0 {
+                self.bad_count += 1;
+                if self.bad.len() < NAMED_BAD_SAMPLES {
+                    self.bad.push(BadSample { x, y, sample });
+                }
+                continue;
+            }
+            let set = &mut sets[sample as usize % replicates];
+            set.radiance += r.cast();
+            set.count += 1;
+            if let Some(first) = path.first {
+                sums.albedo += first.albedo.cast();
+                sums.normal += first.normal.as_dvec3();
+                sums.depth += f64::from(first.depth);
+                sums.hits += 1;
+            }
+        }
+        self.sums[pixel] = sums;
+    }
+
+    fn place(&self, pixel: usize) -> (u32, u32) {
+        let pixel = pixel as u32;
+        (self.x0 + pixel % self.width, self.y0 + pixel / self.width)
+    }
+
+    /// Nothing more is to be added: keeps what the sums come to, which is several times smaller.
+    fn settle(&mut self) {
+        if self.pixels.is_empty() {
+            self.pixels = self.so_far().collect();
+            (self.sums, self.replicates) = (Vec::new(), Vec::new());
+        }
+    }
+
+    fn so_far(&self) -> impl Iterator<Item = Pixel> {
+        let replicates = self.replicates.len() / self.sums.len().max(1);
+        self.sums.iter().zip(self.replicates.chunks(replicates.max(1))).map(|(sums, sets)| sums.pixel(sets))
+    }
+
+    /// The finished pixels with their columns and rows in the picture.
+    pub(super) fn into_pixels(mut self) -> impl Iterator<Item = (u32, u32, Pixel)> {
+        self.settle();
+        let pixels = std::mem::take(&mut self.pixels);
+        pixels.into_iter().enumerate().map(move |(i, pixel)| {
+            let (x, y) = self.place(i);
+            (x, y, pixel)
+        })
+    }
+
+    /// The error that is expected of the tile, as `bench` measures it: the mean over pixels and channels of the variance over the
+    /// square plus 0.01. The few replicates of a single pixel tell little, those of all pixels together enough.
+    fn error(&self) -> f64 {
+        let of_pixel = |p: Pixel| {
+            let (mean, variance) = (p.beauty.to_array(), p.variance.to_array());
+            let of_channel = |(m, v): (f32, f32)| f64::from(v) / (f64::from(m) * f64::from(m) + FLOOR);
+            mean.into_iter().zip(variance).map(of_channel).sum::<f64>() / 3.0
+        };
+        self.so_far().map(of_pixel).sum::<f64>() / self.area() as f64
+    }
+}
+
+impl Sums {
+    fn pixel(&self, sets: &[Replicate]) -> Pixel {
+        let samples: u32 = sets.iter().map(|set| set.count).sum();
+        let n = f64::from(samples.max(1));
+        let beauty = sets.iter().fold(Rgb::BLACK, |sum, set| sum + set.radiance) / n;
+        Pixel {
+            beauty: beauty.cast(),
+            variance: variance_of_mean(sets, beauty).cast().map(shortened),
+            albedo: (self.albedo / n).cast(),
+            normal: (self.normal / n).as_vec3(),
+            depth: if self.hits > 0 { (self.depth / f64::from(self.hits)) as f32 } else { 0.0 },
+            samples,
+        }
+    }
+}
+
+/// The variance of the pixel's mean from the spread of its replicates' means, each weighed by its share of the samples: with equal
+/// shares, their sample variance divided by their number. 0 with a single replicate, which has no spread.
+fn variance_of_mean(sets: &[Replicate], mean: Rgb<f64>) -> Rgb<f64> {
+    let filled = || sets.iter().filter(|set| set.count > 0);
+    let count = filled().count();
+    if count < 2 {
+        return Rgb::BLACK;
+    }
+    let total: f64 = filled().map(|set| f64::from(set.count)).sum();
+    let mut spread = Rgb::BLACK;
+    for set in filled() {
+        let share = f64::from(set.count) / total;
+        let deviation = set.radiance / f64::from(set.count) - mean;
+        spread += deviation * deviation * (share * share);
+    }
+    spread * (count as f64 / (count - 1) as f64)
+}
+
+/// A variance rounded to eight bits of mantissa, one part in 512: far finer than a handful of replicates can tell, and half the
+/// size in a file.
+fn shortened(variance: f32) -> f32 {
+    const DROPPED: u32 = f32::MANTISSA_DIGITS - 1 - 8;
+    let half = 1 << (DROPPED - 1);
+    f32::from_bits((variance.to_bits().saturating_add(half)) >> DROPPED << DROPPED)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variance_of_equal_replicates_is_their_spread_over_their_number() {
+        let means = [1.0, 2.0, 4.0, 5.0];
+        let sets = means.map(|m| Replicate { radiance: Rgb::grey(m * 8.0), count: 8 });
+        let v = variance_of_mean(&sets, Rgb::grey(3.0));
+        // Sample variance (4 + 1 + 1 + 4)/3, divided by 4.
+        assert!((v.r - 10.0 / 12.0).abs() < 1e-12);
+        assert_eq!(variance_of_mean(&sets[..1], Rgb::grey(1.0)), Rgb::BLACK);
+    }
+
+    #[test]
+    fn a_render_may_end_at_doubled_numbers_of_samples() {
+        assert_eq!(levels(4, 50).collect::<Vec<_>>(), [4, 8, 16, 32, 50]);
+        assert_eq!(levels(4, 64).collect::<Vec<_>>(), [4, 8, 16, 32, 64]);
+        assert_eq!(levels(1, 1).collect::<Vec<_>>(), [1]);
+    }
+
+    #[test]
+    fn shortening_keeps_eight_bits_and_does_not_lean() {
+        let values: Vec<f32> = (0..4096).map(|i| 1e-7 * (1.0 + i as f32 / 4096.0)).collect();
+        let ratio = |v: f32| f64::from(shortened(v)) / f64::from(v);
+        assert!(values.iter().all(|&v| (ratio(v) - 1.0).abs() <= 1.0 / 512.0));
+        let mean = values.iter().map(|&v| ratio(v)).sum::<f64>() / 4096.0;
+        assert!((mean - 1.0).abs() < 1e-5, "{mean}");
+        assert_eq!(shortened(0.0), 0.0);
+    }
+}
