@@ -1,10 +1,11 @@
-//! Error against time: how much work a scene is, measured against a long render of its own.
+//! Measuring: error against time, and, in [`rays`], how fast rays are traced.
 //!
-//! Each scene is rendered at several numbers of samples (levels) with several seeds, and once with many more samples as the reference.
+//! How much work a scene is, is measured against a long render of its own. Each scene is rendered at several numbers of samples (levels) with several seeds, and once with many more samples as the reference.
 //! The reference has a seed of its own: the mean of the few seeds under test would hide what they all miss.
 
 mod error;
 mod plot;
+pub mod rays;
 mod summary;
 mod table;
 
@@ -54,6 +55,9 @@ pub enum BenchError {
         /// The size it should have.
         size: String,
     },
+    /// There are no rays to measure with.
+    #[error("no ray of the camera meets a surface; hint: --camera and --target choose another view")]
+    NothingSeen,
     /// The table can't be written.
     #[error("the table could not be made: {0}")]
     Csv(#[from] csv::Error),

@@ -43,26 +43,32 @@ pub fn table(rows: &[(&str, Summary)]) -> String {
             ]
         })
         .collect();
+    columns(heads, &cells)
+}
+
+/// Rows in columns below their heads: the first aligned to the left, the others to the right.
+pub(super) fn columns<const N: usize>(heads: [&str; N], rows: &[[String; N]]) -> String {
     let width = |column: usize| {
-        let of_cells = cells.iter().map(|row| row[column].chars().count());
-        of_cells.chain([heads[column].len()]).max().unwrap_or(0)
+        let of_rows = rows.iter().map(|row| row[column].chars().count());
+        of_rows.chain([heads[column].len()]).max().unwrap_or(0)
     };
-    let line = |row: &[&str]| {
-        let mut text = format!("{:<w$}", row[0], w = width(0));
-        for (column, cell) in row.iter().enumerate().skip(1) {
-            text.push_str(&format!("  {cell:>w$}", w = width(column)));
+    let widths: [usize; N] = std::array::from_fn(width);
+    let line = |row: [&str; N]| {
+        let mut text = format!("{:<w$}", row[0], w = widths[0]);
+        for (cell, w) in row.iter().zip(widths).skip(1) {
+            text.push_str(&format!("  {cell:>w$}"));
         }
         text.trim_end().to_owned() + "\n"
     };
-    let mut text = line(&heads);
-    for row in &cells {
-        text.push_str(&line(&row.each_ref().map(String::as_str)));
+    let mut text = line(heads);
+    for row in rows {
+        text.push_str(&line(row.each_ref().map(String::as_str)));
     }
     text
 }
 
 /// Three significant digits.
-fn digits(value: f64) -> String {
+pub(super) fn digits(value: f64) -> String {
     let decimals = match value.abs() {
         v if v >= 100.0 => 0,
         v if v >= 10.0 => 1,

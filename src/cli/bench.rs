@@ -1,5 +1,7 @@
 //! `pipeline bench`.
 
+mod rays;
+
 use std::path::{Path, PathBuf};
 
 use super::progress::Progress;
@@ -12,7 +14,7 @@ use crate::record::Job;
 use crate::settings::RenderSettings;
 use crate::sweep::{self, Scenes};
 
-/// Measure error against time: how much work scenes are, and whether their pictures are right on average.
+/// Measure error against time: how much work scenes are, and whether their pictures are right on average; or rays a second.
 ///
 /// Each scene, or each job of a manifest, is rendered at several numbers of samples with several seeds, and held against a long render
 /// of its own, which is kept for the next time. The error is the mean over pixels and channels of (x - ref)²/(ref² + 0.01). Work is
@@ -20,9 +22,13 @@ use crate::sweep::{self, Scenes};
 /// error.svg.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  pipeline bench scenes/shaderball.glb scenes/cornell.obj\n  pipeline bench scenes/cornell.obj --levels 4,16,64,256 --seeds 4 --height 300\n  pipeline bench configs/glass.toml -o outputs/bench_glass"
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:\n  pipeline bench scenes/shaderball.glb scenes/cornell.obj\n  pipeline bench scenes/cornell.obj --levels 4,16,64,256 --seeds 4 --height 300\n  pipeline bench configs/glass.toml -o outputs/bench_glass\n  pipeline bench rays scenes/shaderball.glb"
 )]
 pub(super) struct Arguments {
+    #[command(subcommand)]
+    part: Option<Part>,
     /// Scenes, and manifests (.toml).
     #[arg(required = true)]
     targets: Vec<PathBuf>,
@@ -50,7 +56,15 @@ pub(super) struct Arguments {
     conversion: Conversion,
 }
 
+#[derive(Debug, clap::Subcommand)]
+enum Part {
+    Rays(rays::Arguments),
+}
+
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
+    if let Some(Part::Rays(arguments)) = &arguments.part {
+        return rays::run(arguments, talk);
+    }
     let mut levels = arguments.levels.clone();
     levels.sort_unstable();
     levels.dedup();

@@ -13,6 +13,7 @@ mod medium;
 mod offset;
 mod path;
 mod prepare;
+mod probe;
 mod range;
 mod surface;
 
