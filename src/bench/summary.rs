@@ -106,7 +106,7 @@ fn student_95(degrees: usize) -> f64 {
     FIRST.get(degrees - 1).copied().unwrap_or_else(|| Z + FIRST_ORDER / n + SECOND_ORDER / (n * n))
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
 }

@@ -19,6 +19,11 @@ pub fn csv(benches: &[Bench]) -> Result<String, BenchError> {
             writer.write_record(row.into_iter().chain(numbers).chain(errors))?;
         }
     }
+    written(writer)
+}
+
+/// What a writer has written.
+pub(super) fn written(writer: csv::Writer<Vec<u8>>) -> Result<String, BenchError> {
     let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
@@ -43,22 +48,22 @@ pub fn table(rows: &[(&str, Summary)]) -> String {
             ]
         })
         .collect();
-    columns(heads, &cells)
+    columns(heads, &cells, 1)
 }
 
-/// Rows in columns below their heads: the first aligned to the left, the others to the right.
-pub(super) fn columns<const N: usize>(heads: [&str; N], rows: &[[String; N]]) -> String {
+/// Rows in columns below their heads: the first few, of `words`, aligned to the left, the others to the right.
+pub(super) fn columns<const N: usize>(heads: [&str; N], rows: &[[String; N]], words: usize) -> String {
     let width = |column: usize| {
         let of_rows = rows.iter().map(|row| row[column].chars().count());
         of_rows.chain([heads[column].len()]).max().unwrap_or(0)
     };
     let widths: [usize; N] = std::array::from_fn(width);
     let line = |row: [&str; N]| {
-        let mut text = format!("{:<w$}", row[0], w = widths[0]);
-        for (cell, w) in row.iter().zip(widths).skip(1) {
-            text.push_str(&format!("  {cell:>w$}"));
-        }
-        text.trim_end().to_owned() + "\n"
+        let aligned = |(column, (cell, w)): (usize, (&&str, usize))| {
+            if column < words { format!("{cell:<w$}") } else { format!("{cell:>w$}") }
+        };
+        let cells: Vec<String> = row.iter().zip(widths).enumerate().map(aligned).collect();
+        cells.join("  ").trim_end().to_owned() + "\n"
     };
     let mut text = line(heads);
     for row in rows {

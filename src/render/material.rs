@@ -85,7 +85,27 @@ impl PreparedMaterial {
             || material.anisotropy.is_some()
             || colors.into_iter().flatten().any(|c| c.constant().is_none())
             || material.scalars.iter().any(|s| s.constant().is_none());
-        let bsdf = if varies && material.model != Model::Mirror {
+        Self::prepared(material, varies && material.model != Model::Mirror)
+    }
+
+    /// As if all of it varied: it is the same, but is worked out at each point.
+    pub(super) fn varying(material: &Material) -> Self {
+        let prepared = Self::prepared(material, true);
+        match prepared.emission {
+            Emitting::Constant(_, sides) => Self {
+                emission: Emitting::Varying(
+                    material.emission.color.clone(),
+                    material.emission.strength,
+                    sides,
+                ),
+                ..prepared
+            },
+            _ => prepared,
+        }
+    }
+
+    fn prepared(material: &Material, varies: bool) -> Self {
+        let bsdf = if varies {
             Scattering::Varying(Box::new(material.clone()))
         } else {
             let base_color = material.base_color.constant().unwrap_or(Rgb::WHITE);

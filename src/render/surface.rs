@@ -92,7 +92,11 @@ impl<'a> Surface<'a> {
             frame = Frame::from_normal(self.normal * side);
         }
         let wo = frame.local_from_world(self.wo);
-        Some(Shading { frame, bsdf: self.material.bsdf(&scene.scene, &self.at), wo })
+        let mut bsdf = self.material.bsdf(&scene.scene, &self.at);
+        if !scene.techniques.lobes_by_albedo {
+            bsdf = bsdf.with_equal_lobes();
+        }
+        Some(Shading { frame, bsdf, wo })
     }
 
     /// The shading normal on the front, of two-sided materials on the viewer's side.

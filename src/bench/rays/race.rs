@@ -212,5 +212,5 @@ pub fn ray_table(report: &RayReport) -> String {
             ]);
         }
     }
-    columns(["rays", "hit", "kernel", "threads", "hits", "million/s"], &rows)
+    columns(["rays", "hit", "kernel", "threads", "hits", "million/s"], &rows, 3)
 }
