@@ -72,6 +72,11 @@ pub(super) fn columns<const N: usize>(heads: [&str; N], rows: &[[String; N]], wo
     text
 }
 
+/// A ratio, in digits enough for one that is measured.
+pub(super) fn ratio(value: f64) -> String {
+    if (0.095..9.995).contains(&value) { format!("{value:.2}") } else { digits(value) }
+}
+
 /// Three significant digits.
 pub(super) fn digits(value: f64) -> String {
     let decimals = match value.abs() {

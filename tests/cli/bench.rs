@@ -1,4 +1,4 @@
-//! `pipeline bench`: files, figures, and references that are kept; and rays a second.
+//! `pipeline bench`: files, figures, and references that are kept; what techniques are worth; and rays a second.
 
 use crate::support::{Desk, SQUARE, repository, run};
 
@@ -144,4 +144,43 @@ fn rays_need_a_scene_and_a_view_of_it() {
     run(["bench"]).ends_with(64);
     run(["bench", "rays", "--help"]).ends_with(0).says("Example").says("pipeline bench rays ");
     run(["bench", "--help"]).ends_with(0).says("Example").says("pipeline bench ");
+}
+
+#[test]
+fn what_each_technique_is_worth_is_a_table_of_ratios_and_a_chart() {
+    let desk = Desk::with_three_jobs("");
+    let scene = repository("scenes/cornell.obj").to_str().expect("UTF-8").to_owned();
+    let few =
+        ["bench", "--ablate", "--levels", "4,8", "--seeds", "1", "--reference", "256", "--height", "18"];
+    let run = desk.run(few.into_iter().chain([scene.as_str(), "sweep.toml", "-o", "b"])).ends_with(0);
+    let run = run.says("what it does").says("same bits").tells("b/ablation.png");
+    for file in ["ablation.csv", "ablation.png", "ablation.svg"] {
+        assert!(desk.names("b").iter().any(|name| name == file), "{file}");
+    }
+    assert!(desk.bytes("b/ablation.svg").starts_with(b"<svg xmlns"));
+    let csv = String::from_utf8(desk.bytes("b/ablation.csv")).unwrap();
+    let mut reader = csv::Reader::from_reader(csv.as_bytes());
+    let heads = ["scene", "variant", "what_it_does", "error_ratio", "time_ratio", "work_ratio", "same_bits"];
+    assert!(reader.headers().unwrap().iter().eq(heads));
+    let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.expect("a row")).collect();
+    for scene in ["cornell", "roughness=0.10", "roughness=0.50", "roughness=0.90"] {
+        let row = |variant: &str| {
+            let found = rows.iter().find(|row| row[0] == *scene && row[1] == *variant);
+            found.unwrap_or_else(|| panic!("{scene}: no {variant}"))
+        };
+        let ratio = |variant: &str, column: usize| row(variant)[column].parse::<f64>().expect("a number");
+        for saving in ["whole, again", "no constants", "no coverage", "useless light"] {
+            assert_eq!((&row(saving)[6], ratio(saving, 3)), ("yes", 1.0), "{scene}: {saving}");
+        }
+        for technique in ["no nee", "random numbers", "1 replicate", "2 replicates", "8 replicates"] {
+            assert_eq!(&row(technique)[6], "no", "{scene}: {technique}");
+        }
+        assert!(rows.iter().all(|row| &row[1] != "4 replicates"), "that is what the whole renderer has");
+        assert!(ratio("no nee", 3) > 2.0, "{scene}");
+        for row in &rows {
+            let [error, time, work] = [3, 4, 5].map(|column| row[column].parse::<f64>().expect("a number"));
+            assert!(time > 0.0 && (work - error * time).abs() <= 1e-9 * work, "{row:?}");
+        }
+    }
+    assert_eq!(run.stdout.lines().count(), rows.len() + 1);
 }

@@ -6,7 +6,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{Ablation, Row};
 use crate::bench::BenchError;
-use crate::bench::table::digits;
+use crate::bench::table;
 use crate::report::chart::{
     self, Drawing, FAINT, FINE, Figure, GRID, INK, Picture, color, legend, legend_height, stroke, text_style,
 };
@@ -140,5 +140,5 @@ where
         area.draw(&Rectangle::new([(one.min(end), y), (one.max(end), y + BAR * FINE)], color(i).filled()))?;
     }
     let work = text_style(12.0, &FAINT, HPos::Left, VPos::Center);
-    area.draw(&Text::new(digits(row.work()), (right + 5 * FINE, middle), work))
+    area.draw(&Text::new(table::ratio(row.work()), (right + 5 * FINE, middle), work))
 }

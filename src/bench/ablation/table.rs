@@ -2,7 +2,7 @@
 
 use super::Ablation;
 use crate::bench::BenchError;
-use crate::bench::table::{columns, digits, written};
+use crate::bench::table::{columns, ratio, written};
 
 fn yes(is: bool) -> String {
     if is { "yes" } else { "no" }.to_owned()
@@ -15,7 +15,7 @@ pub fn ablation_table(ablations: &[Ablation]) -> String {
         .iter()
         .flat_map(|ablation| ablation.rows.iter().map(move |row| (ablation, row)))
         .map(|(ablation, row)| {
-            let [error, time, work] = [row.error, row.time, row.work()].map(digits);
+            let [error, time, work] = [row.error, row.time, row.work()].map(ratio);
             let same = yes(row.same_bits) + if row.is_wrong() { ", WRONG" } else { "" };
             [ablation.name.clone(), row.name.clone(), row.what.to_owned(), error, time, work, same]
         })
