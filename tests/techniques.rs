@@ -94,8 +94,8 @@ fn mean(rendered: &Rendered) -> (f64, f64) {
     let planes = rendered.raster.picture().rgb().expect("a colour picture");
     let count = (3 * planes[0].len()) as f64;
     // The channels of a pixel rise and fall together: their deviations add up.
-    let deviations: f64 = ["R", "G", "B"].map(|c| variance(c).sqrt()).iter().sum();
-    (planes.map(sum).iter().sum::<f64>() / count, (deviations / count).powi(2))
+    let deviation = ["R", "G", "B"].map(|c| variance(c).sqrt()).iter().sum::<f64>() / count;
+    (planes.map(sum).iter().sum::<f64>() / count, deviation * deviation)
 }
 
 #[test]
