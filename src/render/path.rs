@@ -230,8 +230,8 @@ pub(super) fn direct_light(
         return Rgb::BLACK;
     }
     let (f, pdf_bsdf) = shading.bsdf.eval_with_pdf(shading.wo, wi);
-    let is_useful = |is_dark: bool| !(is_dark && scene.techniques.useful_light);
-    if !is_useful(f.is_black()) {
+    let is_left_out = |is_dark: bool| is_dark && scene.techniques.useful_light;
+    if is_left_out(f.is_black()) {
         return Rgb::BLACK;
     }
     let (arriving, w_light, shadow) = match sample.place {
@@ -251,7 +251,7 @@ pub(super) fn direct_light(
             (radiance, w_light, surface.leave(sample.wi))
         }
     };
-    if !is_useful(arriving.is_black() || w_light == 0.0) {
+    if is_left_out(arriving.is_black() || w_light == 0.0) {
         return Rgb::BLACK;
     }
     *rays += 1;

@@ -59,7 +59,7 @@ impl Row {
 
 /// How many renders [`ablate`] makes, the reference counted.
 pub fn renders(subject: &Subject<'_>, plan: &Plan) -> usize {
-    (Variant::all(&subject.job.settings).len() + 1) * plan.levels.len() * plan.seeds as usize + 1
+    Variant::all(&subject.job.settings).len() * plan.levels.len() * plan.seeds as usize + 1
 }
 
 /// Measures what each technique is worth for a job. `watch` is told of each render before it begins.
@@ -77,8 +77,9 @@ pub fn ablate(subject: &Subject<'_>, plan: &Plan, watch: &mut Watch<'_>) -> Resu
             rounds.push(contest.round(&variants, samples, seed, rounds.len(), watch)?);
         }
     }
-    let rows = variants.into_iter().enumerate().map(|(i, variant)| row(variant, i, &rounds, &plan.levels));
-    Ok(Ablation { name: subject.job.name.clone(), rows: rows.collect() })
+    let variants = variants.iter().enumerate().skip(1);
+    let rows = variants.map(|(place, variant)| row(variant, place, &rounds, &plan.levels)).collect();
+    Ok(Ablation { name: subject.job.name.clone(), rows })
 }
 
 /// What all renders have in common.
@@ -89,10 +90,9 @@ struct Contest<'a> {
     portable: Arc<Geometry>,
 }
 
-/// One render of each: of the whole renderer, and of the variants in their order.
+/// One render of each variant, in their order: the first is the whole renderer.
 struct Round {
     samples: u32,
-    whole: Turn,
     turns: Vec<Turn>,
 }
 
@@ -111,19 +111,12 @@ impl Contest<'_> {
         shift: usize,
         watch: &mut Watch<'_>,
     ) -> Result<Round, BenchError> {
-        let whole = Variant::whole();
-        let mut order: Vec<(usize, &Variant)> = std::iter::once(&whole).chain(variants).enumerate().collect();
-        let first = shift % order.len();
-        order.rotate_left(first);
-        let mut turns = Vec::new();
-        for (place, variant) in order {
-            turns.push((place, self.turn(variant, samples, seed, watch)?));
-        }
-        turns.sort_by_key(|&(place, _)| place);
-        let mut turns = turns.into_iter().map(|(_, turn)| turn);
-        // The whole renderer is first in place, and there is always one.
-        let whole = turns.next().unwrap_or(Turn { seconds: 0.0, error: 0.0, bits: blake3::hash(&[]) });
-        Ok(Round { samples, whole, turns: turns.collect() })
+        let first = shift % variants.len();
+        let order = variants[first..].iter().chain(&variants[..first]);
+        let mut turns =
+            order.map(|variant| self.turn(variant, samples, seed, watch)).collect::<Result<Vec<_>, _>>()?;
+        turns.rotate_right(first);
+        Ok(Round { samples, turns })
     }
 
     fn turn(
@@ -157,8 +150,8 @@ fn bits(raster: &Raster) -> blake3::Hash {
     hasher.finalize()
 }
 
-fn row(variant: Variant, place: usize, rounds: &[Round], levels: &[u32]) -> Row {
-    let pairs = || rounds.iter().map(|round| (round.samples, &round.whole, &round.turns[place]));
+fn row(variant: &Variant, place: usize, rounds: &[Round], levels: &[u32]) -> Row {
+    let pairs = || rounds.iter().map(|round| (round.samples, &round.turns[0], &round.turns[place]));
     let at = |level: u32| pairs().filter(move |(samples, ..)| *samples == level);
     let error_at = |level: u32| {
         let (whole, own) = (mean(at(level).map(|(_, w, _)| w.error)), mean(at(level).map(|(.., t)| t.error)));
@@ -177,5 +170,52 @@ fn row(variant: Variant, place: usize, rounds: &[Round], levels: &[u32]) -> Row 
         must_be_same: variant.must_be_same(),
         name: variant.name().to_owned(),
         what: variant.what(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::RenderSettings;
+
+    fn turn(seconds: f64, error: f64, bits: &[u8]) -> Turn {
+        Turn { seconds, error, bits: blake3::hash(bits) }
+    }
+
+    /// Two levels, three rounds each: a variant of twice the error at both, half the time at one and a quarter at the other.
+    fn rounds(bits: &[u8]) -> Vec<Round> {
+        let round = |samples, pace: f64, time: f64, error: f64| Round {
+            samples,
+            turns: vec![turn(pace, error, b"a"), turn(pace * time, 2.0 * error, bits)],
+        };
+        vec![
+            round(4, 1.0, 0.5, 0.4),
+            round(16, 4.0, 0.25, 0.1),
+            round(4, 3.0, 0.5, 0.3),
+            round(16, 12.0, 0.25, 0.2),
+            // Something disturbed the variant.
+            round(4, 1.0, 9.0, 0.5),
+            round(16, 4.0, 0.25, 0.1),
+        ]
+    }
+
+    #[test]
+    fn ratios_are_of_one_round_and_means_over_the_levels() {
+        let variants = Variant::all(&RenderSettings::default());
+        let found = row(&variants[1], 1, &rounds(b"a"), &[4, 16]);
+        assert!((found.error - 2.0).abs() < 1e-12, "{}", found.error);
+        assert!((found.time - 0.125f64.sqrt()).abs() < 1e-12, "{}", found.time);
+        assert_eq!(found.work(), found.error * found.time);
+    }
+
+    #[test]
+    fn savings_that_change_a_bit_are_wrong_and_other_techniques_are_not() {
+        let variants = Variant::all(&RenderSettings::default());
+        for variant in &variants {
+            assert!(!row(variant, 1, &rounds(b"a"), &[4, 16]).is_wrong(), "{}", variant.name());
+        }
+        let wrong = variants.iter().filter(|variant| row(variant, 1, &rounds(b"b"), &[4, 16]).is_wrong());
+        let names: Vec<&str> = wrong.map(Variant::name).filter(|&name| name != "no avx2").collect();
+        assert_eq!(names, ["whole", "whole, again", "no constants", "no coverage", "useless light"]);
     }
 }

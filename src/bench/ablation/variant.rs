@@ -33,14 +33,10 @@ impl Variant {
         Self { name: name.to_owned(), what, change }
     }
 
-    /// The renderer as it is.
-    pub(super) fn whole() -> Self {
-        Self::new("whole", "the renderer as it is", Change::Nothing)
-    }
-
-    /// All that there are for a job of these settings on this machine.
+    /// All that there are for a job of these settings on this machine. The first is the renderer as it is.
     pub(super) fn all(settings: &RenderSettings) -> Vec<Self> {
         let mut variants = vec![
+            Self::new("whole", "nothing is left out", Change::Nothing),
             Self::new(
                 "whole, again",
                 "nothing is left out: what differs is noise of the clock",

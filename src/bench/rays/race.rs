@@ -11,7 +11,7 @@ use crate::accel::{Bvh, Kernel, Ray};
 use crate::bench::BenchError;
 use crate::bench::summary::median;
 use crate::bench::table::{columns, digits};
-use crate::render::Prepared;
+use crate::render::{Prepared, RenderError};
 
 /// How often the tree is built: one of a million triangles takes seconds.
 const BUILDS: usize = 3;
@@ -87,6 +87,7 @@ pub struct Rate {
 
 /// What takes its turn in each round, and its times so far.
 struct Runner<'a> {
+    kernel: Kernel,
     set: &'a RaySet,
     query: Query,
     threads: usize,
@@ -99,33 +100,23 @@ struct Runner<'a> {
 /// If no ray of the camera hits anything, or the tree can't be built.
 pub fn race(scene: &Prepared, kernels: &[Kernel], repetitions: u32) -> Result<RayReport, BenchError> {
     let sets = ray_sets(scene);
-    let (mut tree, build_seconds) = built(scene)?;
-    let hits = |set: &RaySet| Query::Any.count(&tree, &set.rays);
-    let hits: Vec<usize> = sets.iter().map(hits).collect();
-    if hits.first().is_none_or(|&count| count == 0) {
+    // The second kind starts where the camera's rays hit.
+    if !sets.iter().any(|set| set.kind == RayKind::FirstBounce) {
         return Err(BenchError::NothingSeen);
     }
-    let all_threads = rayon::current_num_threads();
-    let mut runners: Vec<(Kernel, Vec<Runner<'_>>)> =
-        kernels.iter().map(|&kernel| (kernel, runners(&sets, all_threads))).collect();
+    let (mut tree, build_seconds) = built(scene)?;
+    let mut runners: Vec<Runner<'_>> = sets.iter().flat_map(|set| runners(set, kernels)).collect();
     for _ in 0..repetitions {
-        for (kernel, runners) in &mut runners {
-            tree = tree.with_kernel(*kernel);
-            runners.iter_mut().for_each(|runner| runner.run(&tree));
+        for runner in &mut runners {
+            tree = tree.with_kernel(runner.kernel);
+            runner.run(&tree);
         }
     }
-    let rates = |set: &RaySet| {
-        let of_kernel = |(kernel, runners): &(Kernel, Vec<Runner<'_>>)| {
-            let own = runners.iter().filter(|runner| runner.set.kind == set.kind);
-            own.map(|runner| runner.rate(kernel.name())).collect::<Vec<_>>()
-        };
-        runners.iter().flat_map(of_kernel).collect()
-    };
-    let report = |(set, &hits): (&RaySet, &usize)| SetReport {
+    let report = |set: &RaySet| SetReport {
         name: set.kind.name(),
         rays: set.rays.len(),
-        hits: hits as f64 / set.rays.len() as f64,
-        rates: rates(set),
+        hits: Query::Any.count(&tree, &set.rays) as f64 / set.rays.len() as f64,
+        rates: runners.iter().filter(|runner| runner.set.kind == set.kind).map(Runner::rate).collect(),
     };
     let (width, height) = scene.size();
     Ok(RayReport {
@@ -134,45 +125,42 @@ pub fn race(scene: &Prepared, kernels: &[Kernel], repetitions: u32) -> Result<Ra
         build_seconds,
         size: [width, height],
         kernels: kernels.iter().map(|kernel| kernel.name()).collect(),
-        threads: all_threads,
+        threads: rayon::current_num_threads(),
         repetitions,
-        sets: sets.iter().zip(&hits).map(report).collect(),
+        sets: sets.iter().map(report).collect(),
     })
 }
 
 /// A tree over the scene's triangles, and the seconds it took.
-fn built(scene: &Prepared) -> Result<(Bvh, f64), BenchError> {
-    let triangles = scene.geometry().triangles();
+fn built(scene: &Prepared) -> Result<(Bvh, f64), RenderError> {
     let mut seconds = Vec::new();
     let mut build = || {
         let start = Instant::now();
-        let tree = Bvh::build(triangles).map_err(crate::render::RenderError::from);
+        let tree = Bvh::build(scene.geometry().triangles());
         seconds.push(start.elapsed().as_secs_f64());
         tree
     };
-    let mut tree = build()?;
     for _ in 1..BUILDS {
-        tree = build()?;
+        black_box(build()?);
     }
+    let tree = build()?;
     Ok((tree, median(seconds)))
 }
 
-fn runners(sets: &[RaySet], all_threads: usize) -> Vec<Runner<'_>> {
+/// All that is measured of a set.
+fn runners<'a>(set: &'a RaySet, kernels: &[Kernel]) -> Vec<Runner<'a>> {
+    // What a shadow ray meets first is nobody's question.
+    let queries: &[Query] = match set.kind {
+        RayKind::Shadow => &[Query::Any],
+        _ => &[Query::Closest, Query::Any],
+    };
+    let all_threads = rayon::current_num_threads();
     let threads = if all_threads > 1 { vec![1, all_threads] } else { vec![1] };
     let mut runners = Vec::new();
-    for set in sets {
-        // What a shadow ray meets first is nobody's question.
-        let queries: &[Query] = match set.kind {
-            RayKind::Shadow => &[Query::Any],
-            _ => &[Query::Closest, Query::Any],
-        };
+    for &kernel in kernels {
         for &query in queries {
-            runners.extend(threads.iter().map(|&threads| Runner {
-                set,
-                query,
-                threads,
-                seconds: Vec::new(),
-            }));
+            let runner = |&threads: &usize| Runner { kernel, set, query, threads, seconds: Vec::new() };
+            runners.extend(threads.iter().map(runner));
         }
     }
     runners
@@ -189,10 +177,14 @@ impl Runner<'_> {
         self.seconds.push(start.elapsed().as_secs_f64());
     }
 
-    fn rate(&self, kernel: &'static str) -> Rate {
+    fn rate(&self) -> Rate {
         let seconds = median(self.seconds.clone()).max(1e-9);
-        let million_rays_per_second = self.set.rays.len() as f64 * 1e-6 / seconds;
-        Rate { kernel, query: self.query, threads: self.threads, million_rays_per_second }
+        Rate {
+            kernel: self.kernel.name(),
+            query: self.query,
+            threads: self.threads,
+            million_rays_per_second: self.set.rays.len() as f64 * 1e-6 / seconds,
+        }
     }
 }
 
