@@ -1,6 +1,6 @@
 //! How fast rays are traced: `cargo bench --bench traversal`, one thread.
 //!
-//! Rays of a 640 × 480 picture, and two diffuse bounces of them, through the project's scenes and, where the environment's
+//! Rays of a 640 × 480 picture, two diffuse bounces of them and shadow rays, as `pipeline bench rays` makes them, through the project's scenes and, where the environment's
 //! `PIPELINE_CORPUS` names the folder, through its kitchen and bunny. Beside ours stands the traversal that obvhs comes with, of its
 //! binary and of its eight-wide tree, with its triangle test, which is not watertight. Figures are millions of rays a second, the medians
 //! of rounds in which all take turns, and the ratio of ours to the faster of the others.
@@ -8,6 +8,7 @@
 use std::hint::black_box;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::{Vec3, Vec3A};
@@ -20,12 +21,13 @@ use obvhs::ray::RayHit;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use pipeline::accel::{Bvh, Ray};
+use pipeline::bench::rays::{RaySet, ray_sets};
 use pipeline::convert::ConvertOptions;
 use pipeline::import::ImportOptions;
 use pipeline::job::load;
-use pipeline::math::{Frame, hash, warp};
-use pipeline::scene::camera::{FovAxis, Projection};
-use pipeline::scene::{Camera, Scene};
+use pipeline::render::Prepared;
+use pipeline::scene::Camera;
+use pipeline::settings::RenderSettings;
 
 const ROUNDS: usize = 7;
 const SIZE: (u32, u32) = (640, 480);
@@ -34,17 +36,15 @@ fn main() {
     let mut out = std::io::stdout().lock();
     let mut line = |text: String| writeln!(out, "{text}").expect("stdout");
     for path in files() {
-        let loaded =
-            load(&path, &ImportOptions::default(), &ConvertOptions::default(), None).expect("a scene");
-        let triangles = flattened(&loaded.scene);
-        let contest = Contest::new(&triangles);
+        let prepared = prepared(&path);
+        let contest = Contest::new(&prepared.geometry().corners());
         line(format!("{}: {}", path.file_name().unwrap_or_default().display(), contest.report));
         line(format!(
             "  {:<9} {:<8} {:>8} {:>8} {:>8} {:>8} {:>8}",
             "rays", "hit", "thousand", "ours", "bvh2", "cwbvh", "ratio"
         ));
-        let mut rays = camera_rays(&view(&loaded.scene, &path));
-        for kind in ["camera", "bounce 1", "bounce 2"] {
+        for RaySet { kind, rays } in ray_sets(&prepared) {
+            let kind = kind.name();
             for (hit, [ours, bvh2, cwbvh]) in
                 [("closest", contest.closest(&rays)), ("any", contest.any(&rays))]
             {
@@ -54,7 +54,6 @@ fn main() {
                     "  {kind:<9} {hit:<8} {thousand:>8.0} {ours:>8.2} {bvh2:>8.2} {cwbvh:>8.2} {ratio:>8.2}"
                 ));
             }
-            rays = bounced(&contest.ours, &triangles, &rays);
         }
     }
 }
@@ -71,24 +70,17 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
-/// The scene's own or fitting view; the kitchen is looked at from inside.
-fn view(scene: &Scene, path: &Path) -> Camera {
-    match scene.bounds() {
-        Some((low, high)) if path.ends_with("kitchen.obj.zst") => {
-            let eye = low + (high - low) * Vec3::new(0.7, 0.55, 0.8);
-            Camera::look_at(eye, low.midpoint(high), Vec3::Y, 0.9)
-        }
-        _ => scene.cameras[0].item.clone(),
+/// Ready to be rendered with its own or a fitting view; the kitchen is looked at from inside.
+fn prepared(path: &Path) -> Prepared {
+    let loaded = load(path, &ImportOptions::default(), &ConvertOptions::default(), None).expect("a scene");
+    let mut scene = (*loaded.scene).clone();
+    if let Some((low, high)) = scene.bounds().filter(|_| path.ends_with("kitchen.obj.zst")) {
+        let eye = low + (high - low) * Vec3::new(0.7, 0.55, 0.8);
+        scene.cameras[0].item = Camera::look_at(eye, low.midpoint(high), Vec3::Y, 0.9);
     }
-}
-
-fn flattened(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let placed = scene.instances.iter().flat_map(|instance| {
-        let mesh = scene.mesh_of(instance);
-        let place = |c: u32| instance.world_from_object.transform_point3(mesh.positions[c as usize]);
-        mesh.triangles.iter().map(move |corners| corners.map(place))
-    });
-    placed.collect()
+    let (width, height) = SIZE;
+    let settings = RenderSettings { width: Some(width), height: Some(height), ..RenderSettings::default() };
+    Prepared::new(Arc::new(scene), loaded.geometry, &settings).expect("a scene that can be rendered")
 }
 
 /// A tree of ours and two of obvhs', over the same triangles.
@@ -192,43 +184,4 @@ fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
 fn middle<T>(mut runs: Vec<(f64, T)>) -> (f64, T) {
     runs.sort_by(|a, b| a.0.total_cmp(&b.0));
     runs.swap_remove(ROUNDS / 2)
-}
-
-/// A ray through the middle of each pixel.
-fn camera_rays(camera: &Camera) -> Vec<Ray> {
-    let (width, height) = SIZE;
-    let (half_width, half_height) = match camera.projection {
-        Projection::Perspective { fov, axis } => {
-            let half = libm::tanf(fov * 0.5);
-            let aspect = width as f32 / height as f32;
-            if axis == FovAxis::X { (half, half / aspect) } else { (half * aspect, half) }
-        }
-        Projection::Orthographic { .. } => panic!("the scenes have perspective cameras"),
-    };
-    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x as f32 + 0.5, y as f32 + 0.5)));
-    let rays = pixels.map(|(x, y)| {
-        let right = (x / width as f32 * 2.0 - 1.0) * half_width;
-        let up = (1.0 - y / height as f32 * 2.0) * half_height;
-        let direction = camera.world_from_camera.transform_vector3(Vec3::new(right, up, -1.0));
-        Ray::new(camera.world_from_camera.translation.into(), direction.normalize())
-    });
-    rays.collect()
-}
-
-/// A ray from each hit of `rays`, in a direction by the cosine around the normal.
-fn bounced(bvh: &Bvh, triangles: &[[Vec3; 3]], rays: &[Ray]) -> Vec<Ray> {
-    let bounce = |(i, ray): (usize, &Ray)| {
-        let hit = bvh.closest(ray)?;
-        let [a, b, c] = triangles[hit.triangle as usize];
-        let normal = (b - a).cross(c - a).try_normalize()?;
-        let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-        let [b0, b1, b2] = hit.barycentric;
-        let point = a * b0 + b * b1 + c * b2;
-        let unit = |dimension| hash::unit_f32((hash::combine(i as u64, dimension) >> 32) as u32);
-        let local = warp::cosine_hemisphere([unit(rays.len() as u64), unit(rays.len() as u64 + 1)]);
-        let origin = point + normal * (1e-5 * point.abs().max_element());
-        let direction = Frame::from_normal(normal).world_from_local(local).try_normalize()?;
-        Some(Ray { source: Some(hit.triangle), ..Ray::new(origin, direction) })
-    };
-    rays.iter().enumerate().filter_map(bounce).collect()
 }

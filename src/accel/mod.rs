@@ -56,7 +56,7 @@ pub struct Hit {
 }
 
 /// A tree of boxes over triangles.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Bvh {
     root: Child,
     nodes: Vec<Node>,
@@ -121,22 +121,41 @@ impl Child {
     }
 }
 
-/// What traversal computes with.
+/// What traversal computes with. All find the same bits.
 #[derive(Clone, Copy, Debug)]
-enum Kernel {
+pub struct Kernel(Instructions);
+
+#[derive(Clone, Copy, Debug)]
+enum Instructions {
     #[cfg(target_arch = "x86_64")]
     Avx2(avx2::Avx2),
     Portable,
 }
 
 impl Kernel {
-    /// The fastest that the processor has.
-    fn detect() -> Self {
+    /// Plain Rust, for every processor.
+    pub const PORTABLE: Self = Self(Instructions::Portable);
+
+    /// AVX2, where the processor has it.
+    pub fn avx2() -> Option<Self> {
         #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = avx2::Avx2::detect() {
-            return Self::Avx2(avx2);
+        return avx2::Avx2::detect().map(|avx2| Self(Instructions::Avx2(avx2)));
+        #[cfg(not(target_arch = "x86_64"))]
+        None
+    }
+
+    /// The fastest that the processor has.
+    pub fn detect() -> Self {
+        Self::avx2().unwrap_or(Self::PORTABLE)
+    }
+
+    /// The name: `avx2` or `portable`.
+    pub const fn name(self) -> &'static str {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(_) => "avx2",
+            Instructions::Portable => "portable",
         }
-        Self::Portable
     }
 }
 
@@ -150,10 +169,10 @@ impl Bvh {
     /// order.
     #[inline]
     pub fn closest_where(&self, ray: &Ray, counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        match self.kernel {
+        match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2(avx2) => avx2.closest(self, ray, counts),
-            Kernel::Portable => traverse::closest(Portable, self, ray, counts),
+            Instructions::Avx2(avx2) => avx2.closest(self, ray, counts),
+            Instructions::Portable => traverse::closest(Portable, self, ray, counts),
         }
     }
 
@@ -165,10 +184,10 @@ impl Bvh {
     /// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
     #[inline]
     pub fn visit(&self, ray: &Ray, visitor: impl FnMut(Hit) -> ControlFlow<()>) -> bool {
-        match self.kernel {
+        match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2(avx2) => avx2.visit(self, ray, visitor),
-            Kernel::Portable => traverse::visit(Portable, self, ray, visitor),
+            Instructions::Avx2(avx2) => avx2.visit(self, ray, visitor),
+            Instructions::Portable => traverse::visit(Portable, self, ray, visitor),
         }
     }
 
@@ -187,6 +206,17 @@ impl Bvh {
                 }
             }
         }
+    }
+
+    /// The same tree, traversed with another kernel than the fastest.
+    #[must_use]
+    pub fn with_kernel(self, kernel: Kernel) -> Self {
+        Self { kernel, ..self }
+    }
+
+    /// What traversal computes with.
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
     }
 
     /// The number of triangles.

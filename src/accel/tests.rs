@@ -229,7 +229,7 @@ fn kernels_find_the_same_bits_on_any_ray() {
     let (mut hit, mut tied) = (0, 0);
     for (m, triangles) in meshes().into_iter().enumerate() {
         let bvh = Bvh::build(&triangles).unwrap();
-        let twin = Bvh { kernel: Kernel::Portable, ..Bvh::build(&triangles).unwrap() };
+        let twin = Bvh::build(&triangles).unwrap().with_kernel(Kernel::PORTABLE);
         for i in 0..100_000 {
             let ray = ray(i, &triangles);
             let closest = bvh.closest(&ray).map(bits);

@@ -43,9 +43,8 @@ pub(super) struct Level {
 pub(super) fn levels(bench: &Bench) -> Vec<Level> {
     let of = |runs: &[Run]| {
         let errors = runs.iter().map(|run| run.deviation.error);
-        let mut seconds: Vec<f64> = runs.iter().map(|run| run.seconds).collect();
-        seconds.sort_unstable_by(f64::total_cmp);
-        Level { samples: runs[0].samples, error: mean(errors), seconds: median(&seconds) }
+        let seconds = median(runs.iter().map(|run| run.seconds).collect());
+        Level { samples: runs[0].samples, error: mean(errors), seconds }
     };
     bench.runs.chunk_by(|a, b| a.samples == b.samples).map(of).collect()
 }
@@ -107,15 +106,16 @@ fn student_95(degrees: usize) -> f64 {
     FIRST.get(degrees - 1).copied().unwrap_or_else(|| Z + FIRST_ORDER / n + SECOND_ORDER / (n * n))
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// Of sorted values.
-fn median(sorted: &[f64]) -> f64 {
-    let middle = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
+/// The middle of values, of which there is at least one.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
 #[cfg(test)]

@@ -19,6 +19,11 @@ pub fn csv(benches: &[Bench]) -> Result<String, BenchError> {
             writer.write_record(row.into_iter().chain(numbers).chain(errors))?;
         }
     }
+    written(writer)
+}
+
+/// What a writer has written.
+pub(super) fn written(writer: csv::Writer<Vec<u8>>) -> Result<String, BenchError> {
     let bytes = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
@@ -43,26 +48,37 @@ pub fn table(rows: &[(&str, Summary)]) -> String {
             ]
         })
         .collect();
+    columns(heads, &cells, 1)
+}
+
+/// Rows in columns below their heads: the first few, of `words`, aligned to the left, the others to the right.
+pub(super) fn columns<const N: usize>(heads: [&str; N], rows: &[[String; N]], words: usize) -> String {
     let width = |column: usize| {
-        let of_cells = cells.iter().map(|row| row[column].chars().count());
-        of_cells.chain([heads[column].len()]).max().unwrap_or(0)
+        let of_rows = rows.iter().map(|row| row[column].chars().count());
+        of_rows.chain([heads[column].len()]).max().unwrap_or(0)
     };
-    let line = |row: &[&str]| {
-        let mut text = format!("{:<w$}", row[0], w = width(0));
-        for (column, cell) in row.iter().enumerate().skip(1) {
-            text.push_str(&format!("  {cell:>w$}", w = width(column)));
-        }
-        text.trim_end().to_owned() + "\n"
+    let widths: [usize; N] = std::array::from_fn(width);
+    let line = |row: [&str; N]| {
+        let aligned = |(column, (cell, w)): (usize, (&&str, usize))| {
+            if column < words { format!("{cell:<w$}") } else { format!("{cell:>w$}") }
+        };
+        let cells: Vec<String> = row.iter().zip(widths).enumerate().map(aligned).collect();
+        cells.join("  ").trim_end().to_owned() + "\n"
     };
-    let mut text = line(&heads);
-    for row in &cells {
-        text.push_str(&line(&row.each_ref().map(String::as_str)));
+    let mut text = line(heads);
+    for row in rows {
+        text.push_str(&line(row.each_ref().map(String::as_str)));
     }
     text
 }
 
+/// A ratio, in digits enough for one that is measured.
+pub(super) fn ratio(value: f64) -> String {
+    if (0.095..9.995).contains(&value) { format!("{value:.2}") } else { digits(value) }
+}
+
 /// Three significant digits.
-fn digits(value: f64) -> String {
+pub(super) fn digits(value: f64) -> String {
     let decimals = match value.abs() {
         v if v >= 100.0 => 0,
         v if v >= 10.0 => 1,

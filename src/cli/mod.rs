@@ -173,7 +173,9 @@ mod tests {
     #[test]
     fn every_command_has_an_example() {
         use clap::CommandFactory;
-        for command in Arguments::command().get_subcommands() {
+        let program = Arguments::command();
+        let parts = program.get_subcommands().flat_map(clap::Command::get_subcommands);
+        for command in program.get_subcommands().chain(parts) {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(help.contains("Example"), "{}", command.get_name());
         }

@@ -135,6 +135,16 @@ impl<F: Real> Bsdf<F> {
         Self { kind: Kind::Dielectric(Dielectric { ior }) }
     }
 
+    /// The same, but [`Self::sample`] chooses each lobe that is there equally often: for measuring what choosing them by their albedo is
+    /// worth.
+    #[must_use]
+    pub fn with_equal_lobes(mut self) -> Self {
+        if let Kind::Disney(mixture) = &mut self.kind {
+            mixture.equal_lobes = true;
+        }
+        self
+    }
+
     /// The BSDF without the cosine and without its delta lobes.
     #[inline]
     pub fn eval(&self, wo: V3<F>, wi: V3<F>) -> Rgb<F> {

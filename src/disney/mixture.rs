@@ -26,6 +26,8 @@ pub(super) struct Mixture<F> {
     pub(super) transmission: Option<Transmission<F>>,
     pub(super) diffuse_transmission: Option<DiffuseTransmission<F>>,
     pub(super) thin_walled: bool,
+    /// Lobes are sampled equally often, however much they scatter.
+    pub(super) equal_lobes: bool,
 }
 
 impl<F: Real> Mixture<F> {
@@ -40,6 +42,7 @@ impl<F: Real> Mixture<F> {
             transmission: Transmission::new(params),
             diffuse_transmission: DiffuseTransmission::new(params),
             thin_walled: params.thin_walled,
+            equal_lobes: false,
         }
     }
 

@@ -49,14 +49,18 @@ impl<F: Real> Probabilities<F> {
         // The reciprocal of a denormal sum isn't finite.
         let lift = if sum < F::of(1e-30) { F::of(1e30) } else { F::ONE };
         let scale = F::ONE / (sum * lift);
-        let scaled = |estimate: F| estimate * lift * scale;
+        self.map(|estimate| estimate * lift * scale)
+    }
+
+    #[inline]
+    fn map(self, f: impl Fn(F) -> F) -> Self {
         Self {
-            cosine: scaled(self.cosine),
-            uniform: scaled(self.uniform),
-            clearcoat: scaled(self.clearcoat),
-            specular: scaled(self.specular),
-            transmission: scaled(self.transmission),
-            diffuse_transmission: scaled(self.diffuse_transmission),
+            cosine: f(self.cosine),
+            uniform: f(self.uniform),
+            clearcoat: f(self.clearcoat),
+            specular: f(self.specular),
+            transmission: f(self.transmission),
+            diffuse_transmission: f(self.diffuse_transmission),
         }
     }
 
@@ -81,11 +85,18 @@ impl<F: Real> Probabilities<F> {
     }
 }
 
+/// The same for every lobe that is there.
+fn equal_chance<F: Real>(estimate: F) -> F {
+    if estimate > F::ZERO { F::ONE } else { F::ZERO }
+}
+
 impl<F: Real> Mixture<F> {
-    /// Proportional to [`Self::estimates`].
+    /// Proportional to [`Self::estimates`], or equal where they are above 0.
     #[inline]
     pub(super) fn probabilities(&self, wo: V3<F>) -> Probabilities<F> {
-        self.estimates(wo).normalized()
+        let estimates = self.estimates(wo);
+        let chances = if self.equal_lobes { estimates.map(equal_chance) } else { estimates };
+        chances.normalized()
     }
 
     /// What each lobe scatters towards `wo`, about: the mean over channels of its albedo. The only source of lobe probabilities. In

@@ -88,7 +88,9 @@ pub(super) fn sample_pixel(
     inspect: impl FnMut(ReplayVertex),
 ) -> PathSample {
     let settings = &scene.settings;
-    let sampler = Sampler::new(settings.seed, x, y, sample, settings.effective_replicates());
+    // Samples that are sets of their own are independent.
+    let sets = if scene.techniques.sobol { settings.effective_replicates() } else { settings.spp };
+    let sampler = Sampler::new(settings.seed, x, y, sample, sets);
     let [u0, u1, u2, u3] = sampler.set(0, Purpose::Camera);
     let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
     let film = center + Vec2::new(scene.filter.offset(u0), scene.filter.offset(u1));

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::RenderError;
 use super::offset::Departure;
-use crate::accel::{Bvh, Hit, Ray};
+use crate::accel::{Bvh, Hit, Kernel, Ray};
 use crate::scene::{MaterialId, Mesh, Scene};
 
 /// The triangles of a scene and the tree over them. It depends on meshes and instances alone, so that jobs that differ in
@@ -15,7 +15,7 @@ use crate::scene::{MaterialId, Mesh, Scene};
 ///
 /// Floats are fine near 0 and coarse far away: 1/16 m at 1000 km. A scene that lies far from the origin for its size is rendered
 /// around its own centre, [`Self::origin`], to which all positions in here are relative.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Geometry {
     pub(super) bvh: Bvh,
     origin: Vec3,
@@ -27,7 +27,7 @@ pub struct Geometry {
     pub(super) radius: f32,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct PlacedMesh {
     mesh: Arc<Mesh>,
     world_from_object: Affine3A,
@@ -129,6 +129,11 @@ impl Geometry {
         self.origin
     }
 
+    /// The tree that rays are traced in.
+    pub fn tree(&self) -> &Bvh {
+        &self.bvh
+    }
+
     /// What a ray meets first.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.bvh.closest(ray)
@@ -137,6 +142,17 @@ impl Geometry {
     /// From where paths go on that `incoming`, of unit direction, brought to `hit`.
     pub fn departure(&self, incoming: &Ray, hit: &Hit) -> Departure {
         self.at(hit).departure(self, incoming, hit)
+    }
+
+    /// The same, traced with another kernel than the fastest.
+    #[must_use]
+    pub fn with_kernel(self, kernel: Kernel) -> Self {
+        Self { bvh: self.bvh.with_kernel(kernel), ..self }
+    }
+
+    /// The corners of all triangles, relative to [`Self::origin`].
+    pub fn corners(&self) -> Vec<[Vec3; 3]> {
+        self.triangles.iter().map(|triangle| triangle.vertices).collect()
     }
 
     /// The number of triangles, instances counted.

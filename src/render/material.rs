@@ -24,6 +24,8 @@ pub(super) struct PreparedMaterial {
     pub(super) absorption: Option<Rgb>,
     /// A clear sheet: shadow rays may pass.
     pub(super) lets_shadow_rays_pass: bool,
+    /// Lobes are sampled equally often, however much they scatter.
+    equal_lobes: bool,
 }
 
 #[derive(Debug)]
@@ -85,7 +87,36 @@ impl PreparedMaterial {
             || material.anisotropy.is_some()
             || colors.into_iter().flatten().any(|c| c.constant().is_none())
             || material.scalars.iter().any(|s| s.constant().is_none());
-        let bsdf = if varies && material.model != Model::Mirror {
+        Self::prepared(material, varies && material.model != Model::Mirror)
+    }
+
+    /// As if all of it varied: it is the same, but is worked out at each point.
+    pub(super) fn varying(material: &Material) -> Self {
+        let prepared = Self::prepared(material, true);
+        match prepared.emission {
+            Emitting::Constant(_, sides) => Self {
+                emission: Emitting::Varying(
+                    material.emission.color.clone(),
+                    material.emission.strength,
+                    sides,
+                ),
+                ..prepared
+            },
+            _ => prepared,
+        }
+    }
+
+    /// The same, but lobes are sampled equally often.
+    pub(super) fn with_equal_lobes(self) -> Self {
+        let bsdf = match self.bsdf {
+            Scattering::Constant(bsdf) => Scattering::Constant(Box::new(bsdf.with_equal_lobes())),
+            varying => varying,
+        };
+        Self { bsdf, equal_lobes: true, ..self }
+    }
+
+    fn prepared(material: &Material, varies: bool) -> Self {
+        let bsdf = if varies {
             Scattering::Varying(Box::new(material.clone()))
         } else {
             let base_color = material.base_color.constant().unwrap_or(Rgb::WHITE);
@@ -117,6 +148,7 @@ impl PreparedMaterial {
             is_interface: material.is_interface(),
             absorption: Some(material.absorption).filter(|a| material.is_interface() && !a.is_black()),
             lets_shadow_rays_pass: is_clear_sheet(material),
+            equal_lobes: false,
         }
     }
 
@@ -208,7 +240,10 @@ impl PreparedMaterial {
     ) -> &'s Bsdf {
         match &self.bsdf {
             Scattering::Constant(bsdf) => bsdf,
-            Scattering::Varying(material) => varying.insert(bsdf_at(material, scene, at)),
+            Scattering::Varying(material) => {
+                let bsdf = bsdf_at(material, scene, at);
+                varying.insert(if self.equal_lobes { bsdf.with_equal_lobes() } else { bsdf })
+            }
         }
     }
 

@@ -13,8 +13,10 @@ mod medium;
 mod offset;
 mod path;
 mod prepare;
+mod probe;
 mod range;
 mod surface;
+mod techniques;
 mod tile;
 
 use crate::accel::BuildError;
@@ -25,6 +27,7 @@ pub use material::constant_bsdf;
 pub use offset::Departure;
 pub use path::{Replay, ReplayVertex, replay};
 pub use prepare::{Prepared, image_size};
+pub use techniques::Techniques;
 
 /// Why a scene can't be rendered.
 #[derive(Debug, thiserror::Error)]

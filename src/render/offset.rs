@@ -49,6 +49,9 @@ pub(super) const THINNEST: f32 = 0.5;
 const ROUNDS: usize = 32;
 const RELAXATION: f64 = 1.5;
 
+/// Rays to lights end this much before them, in fractions of the distance.
+const BEFORE_LIGHT: f32 = 1.0 - 1.0 / 65536.0;
+
 /// `point` moved off its surface, to the side of `direction`, by its error.
 #[inline(always)]
 pub(super) fn offset(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> Vec3 {
@@ -93,6 +96,13 @@ impl Departure {
         let origin =
             if crosses { offset(self.point, self.error, self.normal, direction) } else { self.this_side };
         self.ray_from(origin, direction)
+    }
+
+    /// The ray in the direction `wi` to a point of a light, ending just before it.
+    #[inline]
+    pub(super) fn reach(&self, wi: Vec3, target: Vec3) -> Ray {
+        let ray = self.ray(wi);
+        Ray { direction: target - ray.origin, t_max: BEFORE_LIGHT, ..ray }
     }
 
     /// Moves the origin of this side's rays off all triangles nearby; `has_plane` tells whether that of the one that was hit can be

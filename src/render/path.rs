@@ -152,7 +152,8 @@ pub(super) fn trace(
         }
 
         // Sample a light, unless no light could be reflected from it.
-        if !shading.bsdf.is_delta() && !scene.lights.is_empty() {
+        let may_reflect = !(shading.bsdf.is_delta() && scene.techniques.useful_light);
+        if may_reflect && !scene.lights.is_empty() {
             let [u_light, u0, u1, _] = sampler.set(vertex, Purpose::Light);
             if let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) {
                 path.radiance += beta
@@ -187,7 +188,7 @@ pub(super) fn trace(
             (!sample.lobe.is_delta()).then_some(LastScatter { point: surface.point, pdf: sample.pdf });
 
         // End paths that carry little, and let survivors stand for them.
-        if scatterings > ROULETTE_START {
+        if scatterings > ROULETTE_START && scene.techniques.roulette {
             let survival = (beta.max_channel() * eta_scale).min(MAX_SURVIVAL);
             if u_roulette >= survival {
                 break;
@@ -230,7 +231,8 @@ pub(super) fn direct_light(
         return Rgb::BLACK;
     }
     let (f, pdf_bsdf) = shading.bsdf.eval_with_pdf(shading.wo, wi);
-    if f.is_black() {
+    let is_left_out = |is_dark: bool| is_dark && scene.techniques.useful_light;
+    if is_left_out(f.is_black()) {
         return Rgb::BLACK;
     }
     let (arriving, w_light, shadow) = match sample.place {
@@ -250,7 +252,7 @@ pub(super) fn direct_light(
             (radiance, w_light, surface.leave(sample.wi))
         }
     };
-    if arriving.is_black() || w_light == 0.0 {
+    if is_left_out(arriving.is_black() || w_light == 0.0) {
         return Rgb::BLACK;
     }
     *rays += 1;

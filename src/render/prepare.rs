@@ -9,6 +9,7 @@ use super::geometry::Geometry;
 use super::material::PreparedMaterial;
 use super::medium::Medium;
 use super::range;
+use super::techniques::Techniques;
 use crate::light::{EmissiveTriangle, EnvironmentLight, Lights};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Camera, MaterialId, Named, Scene};
@@ -37,6 +38,7 @@ pub struct Prepared {
     pub(super) all_covered: bool,
     /// No surface lets shadow rays pass, so that they need none either.
     pub(super) all_opaque: bool,
+    pub(super) techniques: Techniques,
 }
 
 impl Prepared {
@@ -81,9 +83,26 @@ impl Prepared {
             camera_medium,
             all_covered,
             all_opaque,
+            techniques: Techniques::default(),
             scene,
             geometry,
         })
+    }
+
+    /// The same with these techniques alone, for measuring what the others are worth.
+    #[must_use]
+    pub fn with(mut self, techniques: Techniques) -> Self {
+        if !techniques.constants {
+            self.materials =
+                self.scene.materials.iter().map(|m| PreparedMaterial::varying(&m.item)).collect();
+        }
+        if !techniques.lobes_by_albedo {
+            self.materials = self.materials.into_iter().map(PreparedMaterial::with_equal_lobes).collect();
+        }
+        self.all_covered &= techniques.coverage;
+        self.all_opaque &= techniques.coverage;
+        self.techniques = techniques;
+        self
     }
 
     /// Columns and rows of the image.

@@ -153,12 +153,6 @@ impl<'a> Surface<'a> {
     /// The ray to a point of a light, ending just before it.
     #[inline]
     pub(super) fn reach(&self, wi: Vec3, target: Vec3) -> Ray {
-        let mut ray = self.leave(wi);
-        ray.direction = target - ray.origin;
-        ray.t_max = BEFORE_LIGHT;
-        ray
+        self.departure.reach(wi, target)
     }
 }
-
-/// Rays to lights end this much before them, in fractions of the distance.
-const BEFORE_LIGHT: f32 = 1.0 - 1.0 / 65536.0;

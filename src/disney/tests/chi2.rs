@@ -143,6 +143,14 @@ fn more_than_forty_mixed_materials_are_sampled_by_their_pdf() {
 }
 
 #[test]
+fn lobes_that_are_equally_frequent_are_sampled_by_their_pdf_too() {
+    let equal =
+        |m: Twin| Twin { single: m.single.with_equal_lobes(), double: m.double.with_equal_lobes(), ..m };
+    let materials: Vec<Twin> = mixed_materials().into_iter().step_by(4).map(equal).collect();
+    check_all(&materials);
+}
+
+#[test]
 fn transmission_alone_is_sampled_by_its_pdf() {
     // Without what reflects in front: from inside nothing else is there anyway.
     let clear = |roughness, anisotropic, ior, thin_walled, masking| {

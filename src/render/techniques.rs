@@ -1,0 +1,32 @@
+//! What the renderer does to be fast and to have little noise, each to be left out for measuring what it is worth.
+
+/// Techniques, all in use by default. They are no settings: without any of them pictures have the same expectation, and without those
+/// that save work alone, the same bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Techniques {
+    /// Sobol' points; without them independent random numbers, made in the same time.
+    pub sobol: bool,
+    /// Lobes are chosen by their albedo; without it each that is there equally often.
+    pub lobes_by_albedo: bool,
+    /// Paths that carry little end early; without it at the greatest depth.
+    pub roulette: bool,
+    /// Saves work: what is the same all over a material is worked out once; without it at each point.
+    pub constants: bool,
+    /// Saves work: where all surfaces are opaque, rays ask no material whether it is there.
+    pub coverage: bool,
+    /// Saves work: no light is sampled on mirrors, and no shadow ray traced for light that doesn't arrive or is not reflected.
+    pub useful_light: bool,
+}
+
+impl Default for Techniques {
+    fn default() -> Self {
+        Self {
+            sobol: true,
+            lobes_by_albedo: true,
+            roulette: true,
+            constants: true,
+            coverage: true,
+            useful_light: true,
+        }
+    }
+}
