@@ -141,7 +141,8 @@ impl Clusters {
     pub(super) fn importance(&self, receiver: &Receiver) -> [f32; WIDTH] {
         let (p, n) = (receiver.point, receiver.normal);
         let behind = if receiver.sides == Sides::Both { -1.0 } else { 1.0 };
-        std::array::from_fn(|i| {
+        let mut importances = [0.0; WIDTH];
+        for (i, importance) in importances.iter_mut().enumerate() {
             let [x, y, z] = [self.center[0][i] - p.x, self.center[1][i] - p.y, self.center[2][i] - p.z];
             let distance_squared = x * x + y * y + z * z;
             let radius_squared = self.radius_squared[i];
@@ -162,17 +163,16 @@ impl Clusters {
             let (_, received) = minus(to_middle, half);
 
             let is_inside = distance_squared <= radius_squared;
-            if self.intensity[i] == 0.0 || !is_inside && (emitted <= self.cos_emission[i] || received <= 0.0)
-            {
-                return 0.0;
-            }
+            let arrives = is_inside | (emitted > self.cos_emission[i]) & (received > 0.0);
             let cosines =
                 (emitted + in_middle.max(0.0)).max(LEAST_FALLOFF) * (received + to_middle.1.max(0.0));
             let cosines = if is_inside { 4.0 } else { cosines };
-            let importance = self.intensity[i] * cosines / (distance_squared + 0.25 * radius_squared);
+            let arriving = self.intensity[i] * cosines / (distance_squared + 0.25 * radius_squared);
             // Neither nothing nor too much by the range of floats alone.
-            importance.clamp(f32::MIN_POSITIVE, LARGEST)
-        })
+            let arriving = arriving.max(f32::MIN_POSITIVE).min(LARGEST);
+            *importance = if arrives & (self.intensity[i] > 0.0) { arriving } else { 0.0 };
+        }
+        importances
     }
 }
 

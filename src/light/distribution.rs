@@ -127,6 +127,19 @@ mod tests {
     }
 
     #[test]
+    fn the_guide_leads_to_what_a_search_of_all_finds() {
+        for n in [1, 15, 16, 17, 100, 1000, 1024] {
+            let weights: Vec<f64> = (0..n).map(|i| f64::from(i * i % 23 % 5) * 0.7).collect();
+            let d = Distribution::new(&[&weights[..], &[1.0]].concat());
+            for i in 0..10_000 {
+                let u = i as f32 / 10_000.0;
+                let expected = d.cumulative.iter().position(|&c| c > u).expect("the end") - 1;
+                assert_eq!(d.sample(u).map(|(index, _)| index), Some(expected), "{n} {u}");
+            }
+        }
+    }
+
+    #[test]
     fn no_weight_means_nothing_to_choose() {
         assert_eq!(Distribution::new(&[]).sample(0.3), None);
         assert_eq!(Distribution::new(&[0.0, f64::NAN]).sample(0.3), None);

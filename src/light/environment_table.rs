@@ -49,31 +49,29 @@ impl EnvironmentTable {
         let band = |row: usize| polar_cosine(row) - polar_cosine(row + 1);
         let cell_azimuth = std::f64::consts::TAU / columns as f64;
 
-        let sums: Vec<[f64; 3]> = (0..row_count)
+        let (luminances, sums): (Vec<Vec<f32>>, Vec<[f64; 3]>) = (0..row_count)
             .into_par_iter()
             .map(|row| {
                 let cells = cell_means(image, mapping, row, columns);
                 let channels: [fn(&Rgb) -> f32; 3] = [|c| c.r, |c| c.g, |c| c.b];
-                channels.map(|channel| {
+                let sum = channels.map(|channel| {
                     cells.iter().map(|c| f64::from(channel(c).max(0.0))).sum::<f64>()
                         * band(row)
                         * cell_azimuth
-                })
+                });
+                (cells.iter().map(|c| c.luminance()).collect(), sum)
             })
-            .collect();
+            .unzip();
         let total = [0, 1, 2].map(|channel| sums.iter().map(|row| row[channel]).sum::<f64>());
-        let mean = luminance(total) / (4.0 * std::f64::consts::PI);
         let expected = match partner {
             Partner::None => 0.0,
-            Partner::Bsdf => mean,
+            Partner::Bsdf => luminance(total) / (4.0 * std::f64::consts::PI),
         };
-
-        let (in_row, weights): (Vec<Distribution>, Vec<f64>) = (0..row_count)
+        let (in_row, weights): (Vec<Distribution>, Vec<f64>) = luminances
             .into_par_iter()
-            .map(|row| {
-                let cells = cell_means(image, mapping, row, columns);
-                let weights: Vec<f64> =
-                    cells.iter().map(|c| (f64::from(c.luminance()) - expected).max(0.0)).collect();
+            .enumerate()
+            .map(|(row, cells)| {
+                let weights: Vec<f64> = cells.iter().map(|&c| (f64::from(c) - expected).max(0.0)).collect();
                 (Distribution::new(&weights), weights.iter().sum::<f64>() * band(row) * cell_azimuth)
             })
             .unzip();
@@ -197,5 +195,74 @@ impl EnvironmentTables {
         let table = Arc::clone(&entry.table);
         kept.push(entry);
         table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::hash::{combine, unit_f32};
+    use crate::scene::texture::Pixels;
+
+    fn image(value: impl Fn(u32, u32) -> f32) -> Arc<Image> {
+        let (width, height) = (16, 8);
+        let pixels =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
+        Arc::new(Image { name: "test".into(), width, height, channels: 1, pixels: Pixels::F32(pixels) })
+    }
+
+    fn random(i: u32, salt: u64) -> f32 {
+        unit_f32(combine(u64::from(i), salt) as u32)
+    }
+
+    /// Fractions of a turn and of the polar angle, even by solid angle.
+    fn anywhere(i: u32) -> (f32, f32) {
+        let cos = 1.0 - 2.0 * random(i, 2);
+        (random(i, 1), Real::acos(cos) / std::f32::consts::PI)
+    }
+
+    #[test]
+    fn densities_integrate_to_one_with_and_without_a_partner() {
+        let sky = image(|x, y| if (x, y) == (5, 2) { 50.0 } else { (x % 3) as f32 + y as f32 });
+        for mapping in [Equirectangular::YUp, Equirectangular::Aris] {
+            for partner in [Partner::None, Partner::Bsdf] {
+                let table = EnvironmentTable::new(&sky, mapping, partner);
+                let n = 400_000;
+                let sum: f64 = (0..n).map(anywhere).map(|(u, v)| f64::from(table.pdf(u, v))).sum();
+                let integral = sum * 4.0 * std::f64::consts::PI / f64::from(n);
+                assert!((integral - 1.0).abs() < 0.02, "{mapping:?} {partner:?}: {integral}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_partner_finds_what_is_below_the_mean() {
+        // Rows of 1 above and 3 below: the mean is 2, and each row of cells is even but for the four next to the middle.
+        let halves = image(|_, y| if y < 4 { 1.0 } else { 3.0 });
+        let table = EnvironmentTable::new(&halves, Equirectangular::YUp, Partner::Bsdf);
+        assert_eq!(table.pdf(0.3, 0.1), 0.0);
+        assert!(table.pdf(0.3, 0.9) > 0.0);
+        // Of 3 - 2 on half of the sphere; of 2.75 - 2 in the row next to the middle, where both are blended.
+        let blended = Real::cos(3.0 * std::f64::consts::PI / 8.0);
+        let share = ((1.0 - blended) + 0.75 * blended) / 4.0;
+        assert!((table.share() - share).abs() < 1e-6, "{} {share}", table.share());
+        let alone = EnvironmentTable::new(&halves, Equirectangular::YUp, Partner::None);
+        assert!(alone.pdf(0.3, 0.1) > 0.0 && (alone.share() - 1.0).abs() < 1e-6);
+        // To float rounding nothing exceeds the mean of a constant.
+        let even = EnvironmentTable::new(&image(|_, _| 0.7), Equirectangular::YUp, Partner::Bsdf);
+        assert!(even.share() < 1e-6, "{}", even.share());
+    }
+
+    #[test]
+    fn equal_images_share_a_table_until_others_take_its_place() {
+        let tables = EnvironmentTables::default();
+        let get = |value: f32| tables.get(&image(|_, _| value), Equirectangular::YUp, Partner::None);
+        let first = get(1.0);
+        assert!(Arc::ptr_eq(&first, &get(1.0)));
+        assert!(!Arc::ptr_eq(&first, &tables.get(&image(|_, _| 1.0), Equirectangular::YUp, Partner::Bsdf)));
+        for value in 2..=MOST_KEPT as u32 + 1 {
+            get(value as f32);
+        }
+        assert!(!Arc::ptr_eq(&first, &get(1.0)));
     }
 }

@@ -204,7 +204,8 @@ fn split(lights: &mut [u32], bounds: &[LightBounds], depth: u32) -> usize {
     if !(width > 0.0) {
         return half;
     }
-    if depth >= DEEPEST_BY_COST {
+    // What fits into one node needs no thought.
+    if depth >= DEEPEST_BY_COST || lights.len() <= WIDTH {
         lights.select_nth_unstable_by(half, |&a, &b| along(a).total_cmp(&along(b)).then(a.cmp(&b)));
         return half;
     }
@@ -279,5 +280,170 @@ impl Summary {
                     + cos_spread);
         let size_squared = (self.high.as_dvec3() - self.low.as_dvec3()).length_squared();
         self.intensity * size_squared * directions
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bounds::Cone;
+    use super::*;
+    use crate::math::hash::{combine, unit_f32};
+    use crate::scene::material::Sides;
+
+    fn random(i: u32, salt: u64) -> f32 {
+        unit_f32(combine(u64::from(i), salt) as u32)
+    }
+
+    fn anywhere(i: u32, salt: u64) -> Vec3 {
+        Vec3::new(random(i, salt), random(i, salt + 1), random(i, salt + 2)) * 2.0 - 1.0
+    }
+
+    /// Small flat lights all over a cube, facing anywhere; every fifth to both sides.
+    fn lights(n: u32) -> Vec<LightBounds> {
+        let light = |i| {
+            let (place, both_sides) = (anywhere(i, 1), i % 5 == 0);
+            let cone = Cone {
+                axis: anywhere(i, 4).normalize(),
+                spread: 0.0,
+                emission: FRAC_PI_2 as f32,
+                both_sides,
+            };
+            let size = Vec3::splat(0.001);
+            LightBounds { low: place - size, high: place + size, intensity: 0.01 + random(i, 7), cone }
+        };
+        (0..n).map(light).collect()
+    }
+
+    fn receiver(i: u32, sides: Sides) -> Receiver {
+        Receiver { point: anywhere(i, 11), normal: anywhere(i, 14).normalize(), sides }
+    }
+
+    /// What a light of no extent would give.
+    fn irradiance(light: &LightBounds, receiver: &Receiver) -> f64 {
+        let to_light = (light.center() - receiver.point).as_dvec3();
+        let wi = to_light.normalize();
+        let cos = |n: Vec3, both: bool| {
+            let cos = n.as_dvec3().dot(wi);
+            if both { cos.abs() } else { cos.max(0.0) }
+        };
+        let emitted = cos(-light.cone.axis, light.cone.both_sides);
+        let received = cos(receiver.normal, receiver.sides == Sides::Both);
+        f64::from(light.intensity) * emitted * received / to_light.length_squared()
+    }
+
+    #[test]
+    fn what_shines_on_a_receiver_has_a_chance() {
+        let lights = lights(500);
+        let tree = LightTree::new(&lights);
+        let mut wasted = 0.0;
+        for i in 0..200 {
+            for sides in [Sides::Front, Sides::Both] {
+                let receiver = receiver(i, sides);
+                let chances: Vec<f32> = (0..lights.len()).map(|l| tree.probability(&receiver, l)).collect();
+                let sum: f64 = chances.iter().map(|&p| f64::from(p)).sum();
+                assert!(sum < 1.0 + 1e-5, "{sum}");
+                wasted += (1.0 - sum) / 400.0;
+                for (light, &chance) in lights.iter().zip(&chances) {
+                    assert!(chance > 0.0 || irradiance(light, &receiver) < 1e-6, "{light:?} {receiver:?}");
+                }
+            }
+        }
+        // Now and then nothing arrives from a set whose bounds promise something.
+        assert!(wasted < 0.1, "{wasted}");
+    }
+
+    /// Also by χ²: of 99 degrees of freedom, one receiver in 10⁶ lies above 178.
+    #[test]
+    fn lights_come_as_often_as_their_probability_says() {
+        let lights = lights(100);
+        let tree = LightTree::new(&lights);
+        for i in 0..20 {
+            let receiver = receiver(i, Sides::Front);
+            let n = 20_000;
+            let mut counts = vec![0.0; lights.len()];
+            for k in 0..n {
+                let u = f64::from(random(k, 21 + u64::from(i)));
+                let Some((light, p)) = tree.sample(&receiver, u) else { continue };
+                assert!((p - tree.probability(&receiver, light)).abs() <= 1e-5 * p);
+                counts[light] += 1.0;
+            }
+            let chi_squared: f64 = (0..lights.len())
+                .map(|l| (counts[l], f64::from(n) * f64::from(tree.probability(&receiver, l))))
+                .map(
+                    |(count, expected)| {
+                        if expected > 0.0 { (count - expected).powi(2) / expected.max(1.0) } else { count }
+                    },
+                )
+                .sum();
+            assert!(chi_squared < 178.0, "{chi_squared}");
+        }
+    }
+
+    /// The variance of Σ E/p, relative to (Σ E)², against that of choosing by intensity alone.
+    #[test]
+    fn near_and_facing_lights_are_chosen_more_often() {
+        let lights = lights(1000);
+        let tree = LightTree::new(&lights);
+        let total: f64 = lights.iter().map(|l| f64::from(l.intensity)).sum();
+        let (mut by_tree, mut by_power) = (0.0, 0.0);
+        for i in 0..100 {
+            let receiver = receiver(i, Sides::Front);
+            let shares = lights.iter().enumerate().filter_map(|(l, light)| {
+                let e = irradiance(light, &receiver);
+                (e > 1e-6).then(|| {
+                    (e, f64::from(tree.probability(&receiver, l)), f64::from(light.intensity) / total)
+                })
+            });
+            let sums = shares
+                .fold([0.0; 3], |[e1, t, p], (e, tree, power)| [e1 + e, t + e * e / tree, p + e * e / power]);
+            by_tree += sums[1] / (sums[0] * sums[0]) - 1.0;
+            by_power += sums[2] / (sums[0] * sums[0]) - 1.0;
+        }
+        assert!(by_tree < 0.1 * by_power, "{by_tree} {by_power}");
+    }
+
+    #[test]
+    fn no_light_is_no_choice_and_one_light_is_none() {
+        let receiver = receiver(0, Sides::Both);
+        assert_eq!(LightTree::new(&[]).sample(&receiver, 0.5), None);
+        let one = LightTree::new(&lights(1));
+        assert_eq!((one.sample(&receiver, 0.999), one.probability(&receiver, 0)), (Some((0, 1.0)), 1.0));
+    }
+
+    #[test]
+    fn hostile_lights_are_still_lights() {
+        let mut hostile = lights(3000);
+        for (i, light) in hostile.iter_mut().enumerate() {
+            match i % 4 {
+                // All in one place, with and without extent; some far apart, some all but dark.
+                0 => (light.low, light.high) = (Vec3::ZERO, Vec3::ZERO),
+                1 => (light.low, light.high) = (Vec3::splat(-1.0), Vec3::splat(1.0)),
+                2 => (light.low, light.high) = (light.low * 1e18, light.low * 1e18),
+                _ => light.intensity = 1e-30,
+            }
+        }
+        let tree = LightTree::new(&hostile);
+        for i in 0..50 {
+            let receiver = Receiver {
+                point: if i == 0 { Vec3::ZERO } else { anywhere(i, 1) },
+                ..receiver(i, Sides::Both)
+            };
+            let sum: f64 = (0..hostile.len()).map(|l| f64::from(tree.probability(&receiver, l))).sum();
+            assert!((0.9..1.000_1).contains(&sum), "{sum}");
+            for u in [0.0, 0.3, 0.9, 1.0 - f64::EPSILON] {
+                let Some((light, p)) = tree.sample(&receiver, u) else { continue };
+                assert!(p > 0.0 && (p - tree.probability(&receiver, light)).abs() <= 1e-5 * p);
+            }
+        }
+    }
+
+    #[test]
+    fn the_tree_is_the_same_on_any_number_of_threads() {
+        let lights = lights(20_000);
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| format!("{:?}", LightTree::new(&lights)))
+        };
+        assert!(on(1) == on(3));
     }
 }
