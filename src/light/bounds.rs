@@ -169,7 +169,7 @@ impl Clusters {
             let cosines = if is_inside { 4.0 } else { cosines };
             let arriving = self.intensity[i] * cosines / (distance_squared + 0.25 * radius_squared);
             // Neither nothing nor too much by the range of floats alone.
-            let arriving = arriving.max(f32::MIN_POSITIVE).min(LARGEST);
+            let arriving = arriving.clamp(f32::MIN_POSITIVE, LARGEST);
             *importance = if arrives & (self.intensity[i] > 0.0) { arriving } else { 0.0 };
         }
         importances

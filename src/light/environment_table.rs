@@ -100,7 +100,7 @@ impl EnvironmentTable {
         let (top, bottom) = (self.row_cosines[row], self.row_cosines[row + 1]);
         let pdf = self.cell_pdf(column, row);
         let azimuth = (column as f32 + in_column) / self.columns as f32;
-        (pdf > 0.0).then(|| (azimuth, top + (bottom - top) * in_row, pdf))
+        (pdf > 0.0).then_some((azimuth, top + (bottom - top) * in_row, pdf))
     }
 
     /// The density at fractions of a turn and of the polar angle.

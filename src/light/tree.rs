@@ -144,7 +144,7 @@ impl Node {
         let importance = self.clusters.importance(receiver);
         let sum: f32 = importance.iter().sum();
         // Nor where a place is so far away that it is no number.
-        if !(sum > 0.0) {
+        if sum <= 0.0 || sum.is_nan() {
             return None;
         }
         let relative = importance.map(|i| if i > 0.0 { i / sum + LEAST_CHANCE } else { 0.0 });
@@ -201,7 +201,7 @@ fn split(lights: &mut [u32], bounds: &[LightBounds], depth: u32) -> usize {
     let along = |light: u32| f64::from(center(light)[axis]);
     let (low, width) = (f64::from(low[axis]), f64::from(high[axis]) - f64::from(low[axis]));
     let half = lights.len() / 2;
-    if !(width > 0.0) {
+    if width <= 0.0 || width.is_nan() {
         return half;
     }
     // What fits into one node needs no thought.
@@ -285,8 +285,8 @@ impl Summary {
 
 #[cfg(test)]
 mod tests {
-    use super::super::bounds::Cone;
     use super::*;
+    use crate::light::bounds::Cone;
     use crate::math::hash::{combine, unit_f32};
     use crate::scene::material::Sides;
 
@@ -360,7 +360,7 @@ mod tests {
         for i in 0..20 {
             let receiver = receiver(i, Sides::Front);
             let n = 20_000;
-            let mut counts = vec![0.0; lights.len()];
+            let mut counts = vec![0.0f64; lights.len()];
             for k in 0..n {
                 let u = f64::from(random(k, 21 + u64::from(i)));
                 let Some((light, p)) = tree.sample(&receiver, u) else { continue };
@@ -371,7 +371,7 @@ mod tests {
                 .map(|l| (counts[l], f64::from(n) * f64::from(tree.probability(&receiver, l))))
                 .map(
                     |(count, expected)| {
-                        if expected > 0.0 { (count - expected).powi(2) / expected.max(1.0) } else { count }
+                        if expected > 0.0 { (count - expected).sqr() / expected.max(1.0) } else { count }
                     },
                 )
                 .sum();
