@@ -48,7 +48,7 @@ pub(crate) struct Glb {
     nodes: Vec<Value>,
     cameras: Vec<Value>,
     lights: Vec<Value>,
-    extensions: BTreeSet<&'static str>,
+    extensions: BTreeSet<String>,
     triangles: usize,
 }
 
@@ -60,6 +60,8 @@ impl Glb {
 
     /// Adds a material as the specification writes it; its number.
     pub(crate) fn material(&mut self, material: Value) -> usize {
+        let extensions = material["extensions"].as_object();
+        self.extensions.extend(extensions.into_iter().flat_map(|named| named.keys().cloned()));
         self.materials.push(material);
         self.materials.len() - 1
     }
@@ -77,7 +79,6 @@ impl Glb {
 
     /// A black material that emits `color` · `strength`; its number.
     pub(crate) fn emissive(&mut self, name: &str, color: [f64; 3], strength: f64) -> usize {
-        self.extensions.insert("KHR_materials_emissive_strength");
         self.material(json!({
             "name": name,
             "pbrMetallicRoughness": {
@@ -190,7 +191,7 @@ impl Glb {
 
     /// A point light of `intensity` candela at `position`, with its node.
     pub(crate) fn point_light(&mut self, name: &str, position: DVec3, color: [f64; 3], intensity: f64) {
-        self.extensions.insert("KHR_lights_punctual");
+        self.extensions.insert("KHR_lights_punctual".to_owned());
         self.lights.push(json!({ "name": name, "type": "point", "color": color, "intensity": intensity }));
         let light = self.lights.len() - 1;
         self.nodes.push(json!({

@@ -7,6 +7,7 @@ use super::JobError;
 use crate::convert::{ConvertOptions, Note, to_disney};
 use crate::import::{ArisConfig, ArisRun, FileDigest, ImportOptions, Imported, import, import_configured};
 use crate::library::Library;
+use crate::light::EnvironmentTables;
 use crate::record::Warning;
 use crate::render::Geometry;
 use crate::scene::{Named, Scene, framing, studio};
@@ -19,6 +20,8 @@ pub struct LoadedScene {
     pub scene: Arc<Scene>,
     /// The tree.
     pub geometry: Arc<Geometry>,
+    /// What is known of its jobs' environments.
+    pub environments: Arc<EnvironmentTables>,
     /// How it was imported and converted.
     pub import_options: ImportOptions,
     /// As above.
@@ -124,6 +127,7 @@ fn loaded(
     Ok(LoadedScene {
         scene: Arc::new(scene),
         geometry,
+        environments: Arc::default(),
         import_options: import_options.clone(),
         convert_options: convert_options.clone(),
         files,

@@ -200,8 +200,12 @@ fn attempt(
     record: &mut JobRecord,
 ) -> Result<(), JobError> {
     let start = Instant::now();
-    let prepared =
-        Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
+    let prepared = Prepared::sharing(
+        Arc::clone(&planned.scene),
+        Arc::clone(&loaded.geometry),
+        &loaded.environments,
+        &planned.settings,
+    )?;
     record.size = [prepared.size().0, prepared.size().1];
     record.skipped = prepared.skipped();
     record.timings.prepare = start.elapsed().as_secs_f64();

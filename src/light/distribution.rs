@@ -6,12 +6,26 @@
 pub struct Distribution {
     /// Cumulative probabilities, `cumulative[i]` before thing i, the last one 1. Empty if no weight is positive.
     cumulative: Vec<f32>,
+    /// For each of equal parts of [0, 1), a power of two of them, how many of `cumulative` are at or below its beginning; and their
+    /// number. So a search has but a few things to look through.
+    guide: Vec<u32>,
 }
+
+/// Things for each part of the guide, on average; as many at least have none.
+const PER_PART: usize = 4;
 
 /// Random numbers in [0, 1) are multiples of one part in this.
 const GRID: f64 = (1u32 << 24) as f64;
 
 impl Distribution {
+    /// The difference of neighbouring random numbers.
+    pub const STEP: f32 = (1.0 / GRID) as f32;
+
+    /// There is nothing to choose.
+    pub fn is_empty(&self) -> bool {
+        self.cumulative.is_empty()
+    }
+
     /// A distribution in proportion to `weights`, which must not be negative; NaN counts as 0.
     ///
     /// Probabilities are multiples of 2⁻²⁴, as the random numbers are: then a thing comes exactly as often as
@@ -19,7 +33,7 @@ impl Distribution {
     pub fn new(weights: &[f64]) -> Self {
         let total: f64 = weights.iter().copied().filter(|w| *w > 0.0).sum();
         if !(total > 0.0 && total.is_finite()) {
-            return Self { cumulative: Vec::new() };
+            return Self { cumulative: Vec::new(), guide: Vec::new() };
         }
         let mut sum = 0.0;
         let mut cumulative = Vec::with_capacity(weights.len() + 1);
@@ -33,28 +47,34 @@ impl Distribution {
         for c in cumulative.iter_mut().rev().take_while(|c| **c == last) {
             *c = 1.0;
         }
-        Self { cumulative }
+        let guide = guide(&cumulative);
+        Self { cumulative, guide }
     }
 
     /// The thing that `u` in [0, 1) falls on, and its probability. None if there is nothing to choose.
     #[inline]
     pub fn sample(&self, u: f32) -> Option<(usize, f32)> {
-        let (index, _) = self.sample_with_rest(u)?;
-        Some((index, self.probability(index)))
+        let (index, probability, _) = self.sample_with_rest(u)?;
+        Some((index, probability))
     }
 
-    /// The thing that `u` falls on, and where between its ends, in [0, 1).
+    /// The thing that `u` falls on, its probability, and where between its ends `u` lies, in [0, 1).
     #[inline]
-    pub fn sample_with_rest(&self, u: f32) -> Option<(usize, f32)> {
+    pub fn sample_with_rest(&self, u: f32) -> Option<(usize, f32, f32)> {
         if self.cumulative.is_empty() {
             return None;
         }
         // The last entry at or below u begins the interval; impossible things have empty ones.
-        let index = self.cumulative.partition_point(|&c| c <= u) - 1;
+        let parts = self.guide.len().saturating_sub(1);
+        let (from, to) = match self.guide.get((u * parts as f32) as usize..) {
+            Some(&[from, to, ..]) => (from as usize, to as usize),
+            _ => (0, self.cumulative.len()),
+        };
+        let index = from + self.cumulative[from..to].partition_point(|&c| c <= u) - 1;
         let index = index.min(self.cumulative.len() - 2);
         let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
         let rest = if high > low { ((u - low) / (high - low)).min(1.0 - f32::EPSILON / 2.0) } else { 0.0 };
-        Some((index, rest))
+        Some((index, high - low, rest))
     }
 
     /// The probability of a thing; it is exactly that of [`Self::sample`].
@@ -65,6 +85,21 @@ impl Distribution {
             None => 0.0,
         }
     }
+}
+
+fn guide(cumulative: &[f32]) -> Vec<u32> {
+    let parts = (cumulative.len() / PER_PART).next_power_of_two();
+    if parts < PER_PART {
+        return Vec::new();
+    }
+    let mut below = 0;
+    (0..=parts)
+        .map(|part| {
+            let begin = part as f32 / parts as f32;
+            below += cumulative[below..].iter().take_while(|&&c| c <= begin).count();
+            below as u32
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -89,6 +124,19 @@ mod tests {
         let d = Distribution::new(&weights);
         let sum: f64 = (0..1000).map(|i| f64::from(d.probability(i))).sum();
         assert!((sum - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_guide_leads_to_what_a_search_of_all_finds() {
+        for n in [1, 15, 16, 17, 100, 1000, 1024] {
+            let weights: Vec<f64> = (0..n).map(|i| f64::from(i * i % 23 % 5) * 0.7).collect();
+            let d = Distribution::new(&[&weights[..], &[1.0]].concat());
+            for i in 0..10_000 {
+                let u = i as f32 / 10_000.0;
+                let expected = d.cumulative.iter().position(|&c| c > u).expect("the end") - 1;
+                assert_eq!(d.sample(u).map(|(index, _)| index), Some(expected), "{n} {u}");
+            }
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::Distribution;
+use super::environment_table::{EnvironmentTable, EnvironmentTables, Partner};
 use crate::color::Rgb;
 use crate::math::{Real, warp};
 use crate::scene::Image;
@@ -19,6 +19,7 @@ pub struct EnvironmentLight {
     map: Map,
     /// ∫ luminance dω, to the accuracy of one row's height.
     total_luminance: f64,
+    sampled_luminance: f64,
 }
 
 #[derive(Debug)]
@@ -27,47 +28,58 @@ enum Map {
     Image(ImageMap),
 }
 
-/// Cells of equal azimuth and rows of polar angle, between whose corners the interpolated image is simple enough to be
-/// integrated exactly.
 #[derive(Debug)]
 struct ImageMap {
     image: Arc<Image>,
     mapping: Equirectangular,
     /// Sine and cosine of the rotation about the up axis.
     rotation: [f32; 2],
-    columns: usize,
-    /// Cosines of the polar angle between rows, from 1 down to -1.
-    row_cosines: Vec<f32>,
-    rows: Distribution,
-    in_row: Vec<Distribution>,
+    table: Arc<EnvironmentTable>,
 }
 
 impl EnvironmentLight {
-    /// Prepares an environment; `image` is the one its map names.
-    pub fn new(environment: &Environment, image: Option<&Arc<Image>>) -> Self {
+    /// Prepares an environment; `image` is the one its map names, `partner` what else looks for its light. The table comes from
+    /// `tables`.
+    pub fn new(
+        environment: &Environment,
+        image: Option<&Arc<Image>>,
+        partner: Partner,
+        tables: &EnvironmentTables,
+    ) -> Self {
         let scale = environment.color * environment.intensity;
-        match (environment.map.clone(), image) {
-            (EnvironmentMap::Image { mapping, .. }, Some(image)) => {
-                let (map, mean) = ImageMap::new(Arc::clone(image), mapping, environment.rotation, scale);
-                Self { scale, map: Map::Image(map), total_luminance: mean }
+        match (&environment.map, image) {
+            (&EnvironmentMap::Image { mapping, .. }, Some(image)) => {
+                let table = tables.get(image, mapping, partner);
+                let total_luminance = table.total_luminance(scale);
+                let sampled_luminance = total_luminance * table.share();
+                let rotation = [Real::sin(environment.rotation), Real::cos(environment.rotation)];
+                let map = Map::Image(ImageMap { image: Arc::clone(image), mapping, rotation, table });
+                Self { scale, map, total_luminance, sampled_luminance }
             }
             _ => {
                 let total_luminance = f64::from(scale.luminance()) * 4.0 * std::f64::consts::PI;
-                Self { scale, map: Map::Constant, total_luminance }
+                // Nothing exceeds the mean.
+                let sampled_luminance = if partner == Partner::Bsdf { 0.0 } else { total_luminance };
+                Self { scale, map: Map::Constant, total_luminance, sampled_luminance }
             }
         }
     }
 
-    /// ∫ luminance dω over the sphere, to the accuracy of one row's height: it decides how often the environment is chosen.
+    /// ∫ luminance dω over the sphere, to the accuracy of one row's height.
     pub fn total_luminance(&self) -> f64 {
         self.total_luminance
+    }
+
+    /// How much of [`Self::total_luminance`] is for [`Self::sample`] to find: it decides how often the environment is chosen.
+    pub fn sampled_luminance(&self) -> f64 {
+        self.sampled_luminance
     }
 
     /// The radiance that arrives from the unit direction `wi`.
     pub fn radiance(&self, wi: Vec3) -> Rgb {
         match &self.map {
             Map::Constant => self.scale,
-            Map::Image(map) => map.look_up(wi) * self.scale,
+            Map::Image(map) => map.interpolate(map.coordinates(wi)) * self.scale,
         }
     }
 
@@ -79,68 +91,31 @@ impl EnvironmentLight {
                 Some((wi, self.scale, 1.0 / (4.0 * PI)))
             }
             Map::Image(map) => {
-                let (wi, pdf) = map.sample(u)?;
-                Some((wi, map.look_up(wi) * self.scale, pdf))
+                let (azimuth, cos_theta, pdf) = map.table.sample(u)?;
+                let wi = map.direction(azimuth, cos_theta).normalize();
+                Some((wi, self.radiance(wi), pdf))
             }
         }
     }
 
     /// The density of [`Self::sample`] per unit solid angle.
     pub fn pdf(&self, wi: Vec3) -> f32 {
+        self.radiance_with_pdf(wi).1
+    }
+
+    /// [`Self::radiance`] and [`Self::pdf`].
+    pub fn radiance_with_pdf(&self, wi: Vec3) -> (Rgb, f32) {
         match &self.map {
-            Map::Constant => 1.0 / (4.0 * PI),
-            Map::Image(map) => map.pdf(wi),
+            Map::Constant => (self.scale, 1.0 / (4.0 * PI)),
+            Map::Image(map) => {
+                let uv = map.coordinates(wi);
+                (map.interpolate(uv) * self.scale, map.table.pdf(uv.x, uv.y))
+            }
         }
     }
 }
 
 impl ImageMap {
-    /// The map, and its ∫ luminance dω.
-    fn new(image: Arc<Image>, mapping: Equirectangular, rotation: f32, scale: Rgb) -> (Self, f64) {
-        let (columns, row_count) = match mapping {
-            Equirectangular::YUp => (image.width as usize, image.height as usize),
-            // Between aligned corners there is one cell less than there are pixels.
-            Equirectangular::Aris => ((image.width as usize - 1).max(1), (image.height as usize - 1).max(1)),
-        };
-        let row_cosines = (0..=row_count)
-            .map(|row| Real::cos(std::f64::consts::PI * row as f64 / row_count as f64) as f32)
-            .collect();
-        let mut map = Self {
-            image,
-            mapping,
-            rotation: [Real::sin(rotation), Real::cos(rotation)],
-            columns,
-            row_cosines,
-            rows: Distribution::new(&[]),
-            in_row: Vec::new(),
-        };
-        let mut row_weights = Vec::with_capacity(row_count);
-        for row in 0..row_count {
-            let weights: Vec<f64> =
-                (0..columns).map(|column| map.cell_luminance(column, row, row_count, scale)).collect();
-            let band = f64::from(map.row_cosines[row]) - f64::from(map.row_cosines[row + 1]);
-            row_weights.push(weights.iter().sum::<f64>() * band);
-            map.in_row.push(Distribution::new(&weights));
-        }
-        map.rows = Distribution::new(&row_weights);
-        let cell_azimuth = std::f64::consts::TAU / columns as f64;
-        (map, row_weights.iter().sum::<f64>() * cell_azimuth)
-    }
-
-    /// The mean luminance over a cell's azimuths and polar angles. Interpolation is bilinear within the cell's quarters, so corners, edge middles and centre
-    /// weighted 1:2:4 give it exactly, and it is 0 only where the whole cell is black.
-    fn cell_luminance(&self, column: usize, row: usize, rows: usize, scale: Rgb) -> f64 {
-        let mut sum = 0.0;
-        for (j, wj) in [(0.0, 1.0), (0.5, 2.0), (1.0, 1.0)] {
-            for (i, wi) in [(0.0, 1.0), (0.5, 2.0), (1.0, 1.0)] {
-                let u = (column as f32 + i) / self.columns as f32;
-                let v = (row as f32 + j) / rows as f32;
-                sum += wi * wj * f64::from((self.interpolate(Vec2::new(u, v)) * scale).luminance());
-            }
-        }
-        sum / 16.0
-    }
-
     /// The interpolated image at (u, v) in [0, 1]², v from the top.
     fn interpolate(&self, uv: Vec2) -> Rgb {
         let (w, h) = (self.image.width, self.image.height);
@@ -157,10 +132,10 @@ impl ImageMap {
         fetch(0, 0).lerp(fetch(1, 0), tx).lerp(fetch(0, 1).lerp(fetch(1, 1), tx), ty)
     }
 
-    /// Azimuth fraction u, and cosine of the polar angle from the top.
-    fn coordinates(&self, wi: Vec3) -> (f32, f32) {
+    /// Where in [0, 1]² a direction is: u by azimuth, v by the polar angle from the top.
+    fn coordinates(&self, wi: Vec3) -> Vec2 {
         let [sin, cos] = self.rotation;
-        match self.mapping {
+        let (u, cos_theta) = match self.mapping {
             Equirectangular::YUp => {
                 // The image turns by the rotation, the look-up against it.
                 let (x, z) = (wi.x * cos - wi.z * sin, wi.x * sin + wi.z * cos);
@@ -170,7 +145,8 @@ impl ImageMap {
                 let (x, y) = (wi.x * cos + wi.y * sin, wi.y * cos - wi.x * sin);
                 (0.5 - Real::atan2(y, x) / TAU, wi.z)
             }
-        }
+        };
+        Vec2::new(u, Real::acos(cos_theta.clamp(-1.0, 1.0)) / PI)
     }
 
     fn direction(&self, u: f32, cos_theta: f32) -> Vec3 {
@@ -187,40 +163,6 @@ impl ImageMap {
                 let (x, y) = (r * Real::cos(phi), r * Real::sin(phi));
                 Vec3::new(x * cos - y * sin, y * cos + x * sin, cos_theta)
             }
-        }
-    }
-
-    fn look_up(&self, wi: Vec3) -> Rgb {
-        let (u, cos_theta) = self.coordinates(wi);
-        self.interpolate(Vec2::new(u, Real::acos(cos_theta.clamp(-1.0, 1.0)) / PI))
-    }
-
-    fn sample(&self, u: [f32; 2]) -> Option<(Vec3, f32)> {
-        let (row, in_row) = self.rows.sample_with_rest(u[1])?;
-        let (column, in_column) = self.in_row[row].sample_with_rest(u[0])?;
-        let (top, bottom) = (self.row_cosines[row], self.row_cosines[row + 1]);
-        let wi =
-            self.direction((column as f32 + in_column) / self.columns as f32, top + (bottom - top) * in_row);
-        let pdf = self.cell_pdf(column, row);
-        (pdf > 0.0).then(|| (wi.normalize(), pdf))
-    }
-
-    fn pdf(&self, wi: Vec3) -> f32 {
-        let (u, cos_theta) = self.coordinates(wi);
-        let column = ((u * self.columns as f32) as usize).min(self.columns - 1);
-        let below = self.row_cosines.partition_point(|&c| c >= cos_theta);
-        let row = below.clamp(1, self.in_row.len()) - 1;
-        self.cell_pdf(column, row)
-    }
-
-    /// Constant over a cell, per unit solid angle.
-    fn cell_pdf(&self, column: usize, row: usize) -> f32 {
-        let solid_angle = (self.row_cosines[row] - self.row_cosines[row + 1]) * TAU / self.columns as f32;
-        // At the poles of an image of thousands of rows the band is empty in f32.
-        if solid_angle > 0.0 {
-            self.rows.probability(row) * self.in_row[row].probability(column) / solid_angle
-        } else {
-            0.0
         }
     }
 }
@@ -240,7 +182,8 @@ mod tests {
 
     fn light(image: &Arc<Image>, mapping: Equirectangular, rotation: f32) -> EnvironmentLight {
         let map = EnvironmentMap::Image { image: ImageId(0), mapping };
-        EnvironmentLight::new(&Environment { map, color: Rgb::WHITE, intensity: 1.0, rotation }, Some(image))
+        let environment = Environment { map, color: Rgb::WHITE, intensity: 1.0, rotation };
+        EnvironmentLight::new(&environment, Some(image), Partner::None, &EnvironmentTables::default())
     }
 
     fn random(i: u32, salt: u64) -> f32 {

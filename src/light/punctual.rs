@@ -1,7 +1,10 @@
 //! Point, spot and directional lights, as KHR_lights_punctual defines them.
 
+use std::f32::consts::{FRAC_PI_2, PI};
+
 use glam::Vec3;
 
+use super::bounds::{Cone, LightBounds};
 use super::{Light, LightKind, LightPlace, LightSample};
 use crate::math::Real;
 
@@ -20,6 +23,24 @@ pub(super) fn power(light: &Light, scene_radius: f32) -> f64 {
         }
     };
     strength * solid_angle
+}
+
+/// Light sent out straight ahead, in W/sr.
+pub(super) fn intensity(light: &Light) -> f64 {
+    f64::from(light.color.luminance()) * f64::from(light.intensity)
+}
+
+/// Where a light is that has a place, and where it shines.
+pub(super) fn bounds(light: &Light) -> LightBounds {
+    let (place, axis, spread, emission) = match light.kind {
+        LightKind::Point { position, .. } => (position, Vec3::Y, PI, FRAC_PI_2),
+        LightKind::Spot { position, direction, inner, outer, .. } => {
+            (position, direction, inner, (outer - inner).max(0.0))
+        }
+        LightKind::Directional { direction } => (Vec3::ZERO, direction, 0.0, 0.0),
+    };
+    let cone = Cone { axis, spread, emission, both_sides: false };
+    LightBounds { low: place, high: place, intensity: 1.0, cone }
 }
 
 /// What arrives at `from`, if anything does; `probability` is that of choosing this light.

@@ -112,8 +112,8 @@ fn point_light(scene: &Prepared, surface: &Surface<'_>, position: Vec3, energy: 
 fn emitter_check(scene: &Prepared, sampler: &Sampler, surface: &Surface<'_>, rays: &mut u64) -> Rgb {
     let mut varying = None;
     let Some(shading) = surface.shading(scene, &mut varying) else { return Rgb::BLACK };
-    let [u_light, u0, u1, _] = sampler.set(1, Purpose::Light);
-    let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) else { return Rgb::BLACK };
+    let u = sampler.set(1, Purpose::Light);
+    let Some(sample) = scene.lights.sample(&surface.receiver(), u) else { return Rgb::BLACK };
     let cos_light = match sample.place {
         LightPlace::Surface { triangle, barycentric } => scene
             .geometry
@@ -170,8 +170,8 @@ fn whitted(
             break;
         }
         if !shading.bsdf.is_delta() {
-            let [u_light, u0, u1, _] = sampler.set(vertex, Purpose::Light);
-            if let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) {
+            let u = sampler.set(vertex, Purpose::Light);
+            if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
                 path.radiance += beta
                     * direct_light(scene, &surface, &shading, &sample, LIGHTS_ALONE, medium, &mut path.rays);
             }

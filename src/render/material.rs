@@ -18,6 +18,8 @@ pub(super) struct PreparedMaterial {
     normal_map: Option<NormalMap>,
     tangent: Tangent,
     pub(super) sides: Sides,
+    /// Light may come through, straight or scattered.
+    pub(super) transmits: bool,
     /// Light goes through: the inside is a place of its own.
     pub(super) is_interface: bool,
     /// What that place takes of light per metre, if it takes any.
@@ -145,6 +147,7 @@ impl PreparedMaterial {
             normal_map: material.normal_map.clone(),
             tangent: tangent(material),
             sides: material.sides,
+            transmits: material.transmits(),
             is_interface: material.is_interface(),
             absorption: Some(material.absorption).filter(|a| material.is_interface() && !a.is_black()),
             lets_shadow_rays_pass: is_clear_sheet(material),

@@ -87,6 +87,12 @@ impl Departure {
         self.normal
     }
 
+    /// The unit geometric normal on the side that the incoming ray came from.
+    #[inline]
+    pub(super) fn viewed_normal(&self) -> Vec3 {
+        if self.is_front { self.normal } else { -self.normal }
+    }
+
     /// The ray in `direction`.
     #[inline]
     pub fn ray(&self, direction: Vec3) -> Ray {

@@ -11,7 +11,7 @@ use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::disney::Lobe;
-use crate::light::{LightPlace, LightSample};
+use crate::light::{LightPlace, LightSample, Receiver};
 use crate::math::sobol::{Purpose, Sampler};
 
 /// What one camera path found.
@@ -35,7 +35,7 @@ pub(super) struct FirstHit {
 /// sampling can't reach: the camera and specular surfaces.
 #[derive(Clone, Copy)]
 struct LastScatter {
-    point: Vec3,
+    receiver: Receiver,
     pdf: f32,
 }
 
@@ -121,8 +121,9 @@ pub(super) fn trace(
         let emitted = surface.emitted(scene);
         if !emitted.is_black() {
             let w_bsdf = last_scatter.map_or(1.0, |s| {
-                let distance = (surface.point - s.point).length();
-                let pdf_light = scene.lights.pdf_triangle(surface.triangle, ray.direction, distance);
+                let distance = (surface.point - s.receiver.point).length();
+                let pdf_light =
+                    scene.lights.pdf_triangle(&s.receiver, surface.triangle, ray.direction, distance);
                 strategies.w_bsdf(s.pdf, pdf_light)
             });
             path.radiance += beta * emitted * w_bsdf;
@@ -154,8 +155,8 @@ pub(super) fn trace(
         // Sample a light, unless no light could be reflected from it.
         let may_reflect = !(shading.bsdf.is_delta() && scene.techniques.useful_light);
         if may_reflect && !scene.lights.is_empty() {
-            let [u_light, u0, u1, _] = sampler.set(vertex, Purpose::Light);
-            if let Some(sample) = scene.lights.sample(surface.point, u_light, [u0, u1]) {
+            let u = sampler.set(vertex, Purpose::Light);
+            if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
                 path.radiance += beta
                     * direct_light(scene, &surface, &shading, &sample, strategies, medium, &mut path.rays);
             }
@@ -185,7 +186,7 @@ pub(super) fn trace(
         eta_scale *= sample.eta * sample.eta;
         scatterings += 1;
         last_scatter =
-            (!sample.lobe.is_delta()).then_some(LastScatter { point: surface.point, pdf: sample.pdf });
+            (!sample.lobe.is_delta()).then(|| LastScatter { receiver: surface.receiver(), pdf: sample.pdf });
 
         // End paths that carry little, and let survivors stand for them.
         if scatterings > ROULETTE_START && scene.techniques.roulette {

@@ -10,10 +10,10 @@ use super::material::PreparedMaterial;
 use super::medium::Medium;
 use super::range;
 use super::techniques::Techniques;
-use crate::light::{EmissiveTriangle, EnvironmentLight, Lights};
+use crate::light::{EmissiveTriangle, EnvironmentLight, EnvironmentTables, Lights, Partner};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Camera, MaterialId, Named, Scene};
-use crate::settings::RenderSettings;
+use crate::settings::{Integrator, RenderSettings};
 
 /// The size of images where neither settings nor camera say one.
 const DEFAULT_SIZE: (u32, u32) = (640, 480);
@@ -51,6 +51,19 @@ impl Prepared {
         geometry: Arc<Geometry>,
         settings: &RenderSettings,
     ) -> Result<Self, RenderError> {
+        Self::sharing(scene, geometry, &EnvironmentTables::default(), settings)
+    }
+
+    /// As [`Self::new`]; what is to be known of the environment is taken from `tables`, or put there for the next.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn sharing(
+        scene: Arc<Scene>,
+        geometry: Arc<Geometry>,
+        tables: &EnvironmentTables,
+        settings: &RenderSettings,
+    ) -> Result<Self, RenderError> {
         let camera = choose_camera(&scene, settings)?;
         let (width, height) = size_for(&camera.item, settings);
         check(settings, width, height)?;
@@ -62,7 +75,7 @@ impl Prepared {
                 return Err(RenderError::Emission { material: material.name.clone() });
             }
         }
-        let lights = collect_lights(&scene, &geometry, &materials);
+        let lights = collect_lights(&scene, &geometry, &materials, light_partner(settings), tables);
         let all = |is: fn(&PreparedMaterial) -> bool| {
             scene.instances.iter().all(|i| is(&materials[i.material.0 as usize]))
         };
@@ -232,13 +245,31 @@ fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), Rende
     }
 }
 
-fn collect_lights(scene: &Scene, geometry: &Geometry, materials: &[PreparedMaterial]) -> Lights {
+/// What else finds the light that is sampled.
+fn light_partner(settings: &RenderSettings) -> Partner {
+    let weighs_both = settings.nee && settings.mis && settings.integrator == Integrator::Path;
+    if weighs_both { Partner::Bsdf } else { Partner::None }
+}
+
+fn collect_lights(
+    scene: &Scene,
+    geometry: &Geometry,
+    materials: &[PreparedMaterial],
+    partner: Partner,
+    tables: &EnvironmentTables,
+) -> Lights {
     let emission: Vec<_> = materials.iter().map(|m| m.mean_emission(scene)).collect();
     let triangles: Vec<EmissiveTriangle> = geometry
         .materials(scene)
         .filter_map(|(triangle, material)| {
             let (mean_radiance, sides) = emission[material.0 as usize]?;
-            Some(EmissiveTriangle { triangle, vertices: geometry.vertices(triangle), mean_radiance, sides })
+            Some(EmissiveTriangle {
+                triangle,
+                vertices: geometry.vertices(triangle),
+                mean_radiance,
+                sides,
+                is_mirrored: geometry.handedness(triangle) < 0.0,
+            })
         })
         .collect();
     let punctual: Vec<_> = scene.lights.iter().map(|l| l.item.relative_to(geometry.origin())).collect();
@@ -247,7 +278,7 @@ fn collect_lights(scene: &Scene, geometry: &Geometry, materials: &[PreparedMater
             EnvironmentMap::Image { image, .. } => Some(&scene.images[image.0 as usize]),
             EnvironmentMap::Constant => None,
         };
-        EnvironmentLight::new(e, image)
+        EnvironmentLight::new(e, image, partner, tables)
     });
     Lights::new(&triangles, &punctual, environment, geometry.radius)
 }

@@ -5,7 +5,8 @@ use glam::{Vec2, Vec3};
 use super::offset::Departure;
 use super::{Geometry, Prepared};
 use crate::accel::Ray;
-use crate::light::LightPlace;
+use crate::light::{LightPlace, Receiver};
+use crate::scene::material::Sides;
 
 impl Prepared {
     /// What rays are traced in.
@@ -19,10 +20,12 @@ impl Prepared {
         self.camera.ray(film, [0.5; 2])
     }
 
-    /// The shadow ray from a surface to the light, and the place on it, that three numbers in [0, 1) choose. It ends just before the
+    /// The shadow ray from a surface to the light, and the place on it, that four numbers in [0, 1) choose. It ends just before the
     /// light; none where that can't shine.
-    pub fn shadow_ray(&self, from: &Departure, [u_light, u0, u1]: [f32; 3]) -> Option<Ray> {
-        let sample = self.lights.sample(from.point, u_light, [u0, u1])?;
+    pub fn shadow_ray(&self, from: &Departure, u: [f32; 4]) -> Option<Ray> {
+        let normal = from.viewed_normal();
+        let receiver = Receiver { point: from.point, normal, sides: Sides::Front };
+        let sample = self.lights.sample(&receiver, u)?;
         Some(match sample.place {
             LightPlace::Surface { triangle, barycentric } => {
                 let corners = self.geometry.vertices(triangle);

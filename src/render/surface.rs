@@ -11,7 +11,9 @@ use super::offset::Departure;
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::disney::Bsdf;
+use crate::light::Receiver;
 use crate::math::{Frame, V3};
+use crate::scene::material::Sides;
 
 /// A hit with what is known before shading.
 #[derive(Clone, Copy, Debug)]
@@ -83,7 +85,7 @@ impl<'a> Surface<'a> {
         scene: &Prepared,
         varying: &'s mut Option<Bsdf>,
     ) -> Option<Shading<'s>> {
-        let one_sided = self.material.sides == crate::scene::material::Sides::Front;
+        let one_sided = self.material.sides == Sides::Front;
         let is_interface = self.material.is_interface;
         if one_sided && !self.is_front && !is_interface {
             return None;
@@ -103,7 +105,7 @@ impl<'a> Surface<'a> {
 
     /// The shading normal on the front, of two-sided materials on the viewer's side.
     pub(super) fn front_normal(&self, scene: &Prepared) -> Vec3 {
-        let one_sided = self.material.sides == crate::scene::material::Sides::Front;
+        let one_sided = self.material.sides == Sides::Front;
         let normal = self.at.shading_normal(self.normal);
         match (self.is_front || self.material.is_interface, one_sided) {
             (true, _) => self.frame_around(scene, normal).normal,
@@ -120,6 +122,14 @@ impl<'a> Surface<'a> {
             let towards_viewer = if self.is_front { self.normal } else { -self.normal };
             keep_reflection_above(mapped * side, towards_viewer, self.wo) * side
         })
+    }
+
+    /// The place as lights see it.
+    #[inline]
+    pub(super) fn receiver(&self) -> Receiver {
+        let normal = self.departure.viewed_normal();
+        let sides = if self.material.transmits { Sides::Both } else { Sides::Front };
+        Receiver { point: self.point, normal, sides }
     }
 
     /// Whether `wi` leaves on the viewer's side of the geometric surface.

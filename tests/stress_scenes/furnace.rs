@@ -7,7 +7,7 @@ use pipeline::render::{Geometry, Prepared, replay};
 use pipeline::scene::{Camera, Mesh, Scene};
 
 use crate::common::closed::{Placement, meshes};
-use crate::common::{emitting, lambert, largest_error, render_scene, scene, small, sphere};
+use crate::common::{emitting, lambert, largest_error, mean, render_scene, scene, small, sphere};
 
 const ALBEDO: f32 = 0.5;
 /// Roulette begins after it: until then a path that stays inside has nothing random in its throughput.
@@ -56,11 +56,13 @@ fn every_path_in_every_closed_mesh_finds_all_its_light_at_every_scale() {
     }
 }
 
-/// In a sphere both strategies have the same density, that of the cosine, and no sample is better than another: what noise is left
-/// in a pixel of 256 samples comes from the facets.
+/// In a sphere BSDF sampling is perfect. So would be the choice of lights by their area alone; what noise is left in a pixel of 256
+/// samples comes from the choice by distance and cosines.
 const FINE: u32 = 128;
-/// The largest |pixel/exact - 1|: 0.0008 was measured.
-const BOUND: f64 = 0.0015;
+/// The largest |pixel/exact - 1|: 0.01 was measured.
+const BOUND: f64 = 0.015;
+/// The largest |mean of all pixels/exact - 1|: 0.0006 was measured.
+const MEAN_BOUND: f64 = 0.001;
 
 #[test]
 fn every_pixel_of_a_furnace_is_right_at_every_scale() {
@@ -69,6 +71,8 @@ fn every_pixel_of_a_furnace_is_right_at_every_scale() {
         let rendered = render_scene(&room, &small(12, 12, 256, DEPTH));
         let error = largest_error(&rendered, exact());
         assert!(error < BOUND, "scale {scale}: {error:e}");
+        let error = (mean(&rendered) / exact() - 1.0).abs();
+        assert!(error < MEAN_BOUND, "scale {scale}, the mean: {error:e}");
         assert_eq!(rendered.counts.bad_samples, 0);
     }
 }
@@ -94,6 +98,8 @@ fn every_pixel_of_a_furnace_is_right_a_thousand_kilometres_from_the_origin() {
         let rendered = render_scene(&room, &small(12, 12, 256, DEPTH));
         let error = largest_error(&rendered, exact());
         assert!(error < BOUND, "scale {scale}: {error:e}");
+        let error = (mean(&rendered) / exact() - 1.0).abs();
+        assert!(error < MEAN_BOUND, "scale {scale}, the mean: {error:e}");
         assert_eq!(rendered.counts.bad_samples, 0);
     }
 }
@@ -102,12 +108,14 @@ fn every_pixel_of_a_furnace_is_right_a_thousand_kilometres_from_the_origin() {
 /// a radius of some grid steps there is no sphere any more.
 #[test]
 fn every_pixel_of_a_furnace_modelled_far_away_is_right_as_far_as_floats_can_hold_it() {
-    for (radius, bound) in [(1e1, 0.02), (1e2, 0.004), (1e3, BOUND), (1e6, BOUND)] {
+    for (radius, bound) in [(1e1, 0.02), (1e2, BOUND), (1e3, BOUND), (1e6, BOUND)] {
         let center = Vec3::new(1e6, -1e6, 1e6);
         let room = room(sphere(radius, center, FINE), center, Vec3::X);
         let rendered = render_scene(&room, &small(12, 12, 256, DEPTH));
         let error = largest_error(&rendered, exact());
         assert!(error < bound, "radius {radius}: {error:e}");
+        let error = (mean(&rendered) / exact() - 1.0).abs();
+        assert!(error < MEAN_BOUND, "radius {radius}, the mean: {error:e}");
         assert_eq!(rendered.counts.bad_samples, 0);
     }
 }

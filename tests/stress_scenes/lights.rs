@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use pipeline::color::Rgb;
 use pipeline::disney::Model;
-use pipeline::light::EnvironmentLight;
+use pipeline::light::{EnvironmentLight, EnvironmentTables, Partner};
 use pipeline::scene::environment::{Environment, EnvironmentMap, Equirectangular};
 use pipeline::scene::material::Sides;
 use pipeline::scene::texture::Pixels;
@@ -117,7 +117,13 @@ fn a_sun_of_one_pixel_is_neither_lost_nor_doubled() {
     let image = Image { name: "sky".into(), width, height, channels: 1, pixels: Pixels::F32(values) };
     let map = EnvironmentMap::Image { image: ImageId(0), mapping: Equirectangular::YUp };
     let sky = Environment { map, color: Rgb::WHITE, intensity: 1.0, rotation: 0.3 };
-    let irradiance = integral(&EnvironmentLight::new(&sky, Some(&Arc::new(image.clone()))));
+    let light = EnvironmentLight::new(
+        &sky,
+        Some(&Arc::new(image.clone())),
+        Partner::None,
+        &EnvironmentTables::default(),
+    );
+    let irradiance = integral(&light);
 
     let floor = square(5.0, 0.0);
     let camera = Camera::look_at(Vec3::Y, Vec3::ZERO, Vec3::Z, 0.5);

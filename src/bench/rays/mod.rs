@@ -86,9 +86,9 @@ struct Foothold {
 }
 
 impl Foothold {
-    /// Three numbers in [0, 1), others for each purpose.
-    fn numbers(&self, purpose: u64) -> [f32; 3] {
-        [0, 1, 2].map(|i| {
+    /// Four numbers in [0, 1), others for each purpose.
+    fn numbers(&self, purpose: u64) -> [f32; 4] {
+        [0, 1, 2, 3].map(|i| {
             let word = hash::combine(hash::combine(self.index, purpose), i);
             hash::unit_f32((word >> 32) as u32)
         })
@@ -107,7 +107,7 @@ fn footholds(scene: &Prepared, tree: &Bvh, rays: &[Ray]) -> Vec<Foothold> {
 
 fn bounced(footholds: &[Foothold], bounce: u64) -> Vec<Ray> {
     let ray = |foothold: &Foothold| {
-        let [_, u0, u1] = foothold.numbers(bounce);
+        let [u0, u1, ..] = foothold.numbers(bounce);
         let local = warp::cosine_hemisphere([u0, u1]);
         foothold.departure.ray(Frame::from_normal(foothold.normal).world_from_local(local).normalize())
     };
