@@ -27,7 +27,7 @@ fn half_noisy() -> Scene {
     world
 }
 
-const GOAL: f32 = 0.002;
+const GOAL: f32 = 0.0004;
 
 fn to_error(seed: u64) -> RenderSettings {
     RenderSettings { error: Some(GOAL), seed, ..small(64, 48, 4096, 6) }

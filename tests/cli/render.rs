@@ -209,3 +209,31 @@ fn turning_an_environment_that_is_not_there_is_refused() {
     }
     assert_eq!(desk.names("."), ["sweep.toml"]);
 }
+
+#[test]
+fn a_render_ends_at_an_error_or_when_time_is_up() {
+    let desk = desk();
+    let scene = spheres();
+    let attribute = |name: &str, image: &str| desk.raster(image).picture().attribute(name).cloned();
+    let run = |more: &[&str]| {
+        let fixed = ["render", scene.to_str().unwrap(), "--width", "48", "--height", "32"];
+        desk.run(fixed.iter().chain(more))
+    };
+    run(&["-o", "a.exr", "--error", "0.003"]).ends_with(0).tells("samples a pixel on average");
+    assert_eq!(attribute("pipeline:error", "a.exr"), Some(Attribute::Float(0.003)));
+    assert!(attribute("pipeline:key", "a.exr").is_some());
+    let samples = &desk.raster("a.exr").layer("data").unwrap().channel("samples").unwrap().values.clone();
+    assert!(samples.iter().all(|n| (16.0..65536.0).contains(n)));
+    assert!(samples.iter().any(|n| *n != samples[0]), "no tile needed more samples than another");
+
+    run(&["-o", "b.exr", "--time-limit", "0.2"]).ends_with(0).tells("samples a pixel on average");
+    assert_eq!(attribute("pipeline:time_limit", "b.exr"), Some(Attribute::Float(0.2)));
+    for name in ["pipeline:key", "pipeline:identity"] {
+        assert_eq!(attribute(name, "b.exr"), None, "the machine had a say");
+    }
+
+    for (option, value) in [("--error", "0"), ("--error", "2"), ("--error", "nan"), ("--time-limit", "-1")] {
+        run(&["-o", "c.exr", &format!("{option}={value}")]).ends_with(64).tells("is expected, such as");
+    }
+    run(&["-o", "c.exr", "--error", "0.02", "--replicates", "1"]).ends_with(2).tells("a single replicate");
+}
