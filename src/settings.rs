@@ -179,6 +179,14 @@ impl Default for RenderSettings {
 }
 
 impl RenderSettings {
+    /// How many samples a pixel gets, for people.
+    pub fn samples_described(&self) -> String {
+        match self.error {
+            None => format!("{} samples", self.spp),
+            Some(error) => format!("samples to an error of {error}, at most {}", self.spp),
+        }
+    }
+
     /// The replicates that a render has: no more than it has samples.
     pub fn effective_replicates(&self) -> u32 {
         self.replicates.min(self.spp)

@@ -127,8 +127,10 @@ fn described(sweep: &Sweep, jobs: &[&Job]) -> String {
             text += &format!("  {} = {}\n", o.path, o.value);
         }
         text += &format!(
-            "  samples = {}, seed = {}, max_depth = {}\n",
-            settings.spp, settings.seed, settings.max_depth
+            "  {}, seed = {}, max_depth = {}\n",
+            settings.samples_described(),
+            settings.seed,
+            settings.max_depth
         );
     }
     text + &format!("{} jobs into {}\n", jobs.len(), sweep.folder.display())

@@ -104,5 +104,5 @@ fn subtitle(sweep: &Sweep) -> String {
     let scene = Path::new(scenes.first().copied().unwrap_or_default());
     let scene = scene.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let more = if scenes.len() > 1 { " and others" } else { "" };
-    format!("{scene}{more} · {} samples · seed {}", settings.spp, settings.seed)
+    format!("{scene}{more} · {} · seed {}", settings.samples_described(), settings.seed)
 }
