@@ -22,7 +22,7 @@ pub struct RenderSettings {
     pub spp: u32,
     /// The error at which to stop: the mean over pixels and channels of variance/(value² + 0.01), as `pipeline bench` measures it. Each
     /// tile of 16 × 16 pixels is judged by itself, at 16 samples and whenever their number has doubled. Stopping where the samples
-    /// happen to agree darkens pictures slightly.
+    /// happen to agree biases pictures slightly.
     #[schemars(range(min = 0.0, max = 1.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f32>,

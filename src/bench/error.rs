@@ -2,10 +2,8 @@
 
 use serde::Serialize;
 
+use crate::math::stats::relative_square;
 use crate::raster::Layer;
-
-/// Added to the square of the reference: dark pixels count by their absolute error, bright ones by the relative one.
-const FLOOR: f64 = 0.01;
 
 /// The part of the values that counts as the tail.
 const TAIL: f64 = 0.001;
@@ -29,7 +27,7 @@ pub(super) fn deviation(picture: &Layer, reference: &Layer) -> Deviation {
     let mut errors: Vec<f64> = pairs()
         .map(|(&x, &r)| {
             let (x, r) = (f64::from(x), f64::from(r));
-            (x - r) * (x - r) / (r * r + FLOOR)
+            relative_square((x - r) * (x - r), r)
         })
         .collect();
     let count = errors.len().max(1) as f64;

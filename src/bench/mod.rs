@@ -1,7 +1,8 @@
 //! Measuring: error against time, in [`ablation`] what each technique has to do with it, and in [`rays`] how fast rays are traced.
 //!
-//! How much work a scene is, is measured against a long render of its own. Each scene is rendered at several numbers of samples (levels) with several seeds, and once with many more samples as the reference.
-//! The reference has a seed of its own: the mean of the few seeds under test would hide what they all miss.
+//! How much work a scene is, is measured against a long render of its own. Each scene is rendered at several numbers of samples (levels)
+//! with several seeds, and once with many more samples as the reference. That has a seed of its own: the mean of the few seeds under test
+//! would hide what they all miss.
 
 pub mod ablation;
 mod error;
@@ -120,7 +121,7 @@ pub fn measure(subject: &Subject<'_>, plan: &Plan, watch: &mut Watch<'_>) -> Res
     // All levels of a seed, then the next seed: what disturbs the machine for a while disturbs all levels.
     for seed in subject.seeds(plan) {
         for &samples in &plan.levels {
-            let prepared = subject.prepared(&subject.planned(samples, seed)?)?;
+            let prepared = subject.prepared(subject.planned(samples, seed)?, &subject.loaded.geometry)?;
             let what = format!("{name}: {samples} samples, seed {seed}");
             let (Rendered { raster, counts }, seconds) = timed(&prepared, &what, watch)?;
             let deviation = error::deviation(raster.picture(), reference.picture());

@@ -7,7 +7,7 @@ use crate::imagefile::{self, write_exr};
 use crate::job::{self, Build, JobError, LoadedScene, PlannedJob};
 use crate::raster::Raster;
 use crate::record::Job;
-use crate::render::{Control, Prepared, RenderError};
+use crate::render::{Control, Geometry, Prepared, RenderError};
 
 /// Added to a job's seed for its reference.
 const REFERENCE_SEED: u64 = 1 << 40;
@@ -43,15 +43,21 @@ impl Subject<'_> {
         job::plan(&job, self.loaded, self.build)
     }
 
-    pub(super) fn prepared(&self, planned: &PlannedJob) -> Result<Prepared, RenderError> {
-        Prepared::new(Arc::clone(&planned.scene), Arc::clone(&self.loaded.geometry), &planned.settings)
+    /// The job ready to be rendered, its triangles traced in `geometry`.
+    pub(super) fn prepared(
+        &self,
+        planned: PlannedJob,
+        geometry: &Arc<Geometry>,
+    ) -> Result<Prepared, RenderError> {
+        let environments = &self.loaded.environments;
+        Prepared::sharing(planned.scene, Arc::clone(geometry), environments, &planned.settings)
     }
 
     /// The long render, from an earlier measurement of the same job where there is one.
     pub(super) fn reference(&self, plan: &Plan, watch: &mut Watch<'_>) -> Result<Raster, BenchError> {
         let planned = self.planned(plan.reference, self.job.settings.seed + REFERENCE_SEED)?;
         let path = plan.folder.join(format!("reference-{}.exr", &planned.key[..16]));
-        let prepared = self.prepared(&planned)?;
+        let prepared = self.prepared(planned, &self.loaded.geometry)?;
         let (width, height) = prepared.size();
         if path.is_file() {
             let kept = imagefile::read(&path)?;

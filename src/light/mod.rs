@@ -64,7 +64,7 @@ pub struct Lights {
     /// Between all near lights, each far one, and the environment.
     selection: Distribution,
     /// Where among the near lights a triangle is, by the triangle's index, sorted.
-    by_triangle: Vec<(u32, Wedge)>,
+    by_triangle: Vec<(u32, PatchPart)>,
 }
 
 /// A light that has a place.
@@ -76,7 +76,7 @@ enum NearLight {
 
 /// A triangle of a patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Wedge {
+struct PatchPart {
     light: u32,
     /// Which of the patch's triangles.
     index: u32,
@@ -196,7 +196,7 @@ impl Lights {
     /// unit direction `wi` from there; 0 for triangles that are not lights.
     pub fn pdf_triangle(&self, receiver: &Receiver, triangle: u32, wi: Vec3, distance: f32) -> f32 {
         let Ok(found) = self.by_triangle.binary_search_by_key(&triangle, |&(t, _)| t) else { return 0.0 };
-        let Wedge { light, index } = self.by_triangle[found].1;
+        let PatchPart { light, index } = self.by_triangle[found].1;
         let NearLight::Patch(patch) = &self.near[light as usize] else { return 0.0 };
         let chance = self.selection.probability(0) * self.tree.probability(receiver, light as usize);
         if chance > 0.0 { chance * patch.pdf(receiver.point, index, wi, distance) } else { 0.0 }
@@ -258,7 +258,7 @@ impl EmissiveTriangle {
 
 /// The triangles that shine, neighbours paired, and where each has gone. Of coincident lights one is seen: sampled on their own, each
 /// would shine in full.
-fn patches(triangles: &[EmissiveTriangle]) -> (Vec<Patch>, Vec<(u32, Wedge)>) {
+fn patches(triangles: &[EmissiveTriangle]) -> (Vec<Patch>, Vec<(u32, PatchPart)>) {
     let mut by_place = BTreeMap::new();
     let mut distinct: Vec<&EmissiveTriangle> = Vec::new();
     let mut copies: Vec<(u32, usize)> = Vec::new();
@@ -270,14 +270,14 @@ fn patches(triangles: &[EmissiveTriangle]) -> (Vec<Patch>, Vec<(u32, Wedge)>) {
         }
     }
     let mut patches = Vec::new();
-    let mut wedges = Vec::with_capacity(distinct.len());
-    while let Some(first) = distinct.get(wedges.len()) {
-        let pair = distinct.get(wedges.len() + 1).and_then(|second| Patch::pair(first, second));
+    let mut parts = Vec::with_capacity(distinct.len());
+    while let Some(first) = distinct.get(parts.len()) {
+        let pair = distinct.get(parts.len() + 1).and_then(|second| Patch::pair(first, second));
         let patch = pair.unwrap_or_else(|| Patch::single(first));
-        wedges.extend((0..patch.len() as u32).map(|index| Wedge { light: patches.len() as u32, index }));
+        parts.extend((0..patch.len() as u32).map(|index| PatchPart { light: patches.len() as u32, index }));
         patches.push(patch);
     }
-    let mut by_triangle: Vec<_> = copies.into_iter().map(|(triangle, i)| (triangle, wedges[i])).collect();
+    let mut by_triangle: Vec<_> = copies.into_iter().map(|(triangle, i)| (triangle, parts[i])).collect();
     by_triangle.sort_unstable();
     (patches, by_triangle)
 }

@@ -2,6 +2,12 @@
 //!
 //! All in `f64`; arguments outside a function's domain give NaN, never a panic.
 
+/// The error measure of renders: a squared deviation over the square of the right value plus 0.01. Bright values count by their relative
+/// error, dark ones by the absolute one.
+pub fn relative_square(squared: f64, right: f64) -> f64 {
+    squared / (right * right + 0.01)
+}
+
 /// The regularised upper incomplete gamma function Q(a, x) = Γ(a, x)/Γ(a), in [0, 1], for a > 0 and x ≥ 0.
 ///
 /// Series below x = a + 1, Lentz' continued fraction above (Numerical Recipes, 3rd edition, section 6.2); relative error about 1e-13

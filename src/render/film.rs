@@ -53,8 +53,8 @@ pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderErr
         Some(limit) => {
             let deadline = Instant::now() + limit;
             // Every tile gets its first samples, also after the deadline: a picture has no holes.
-            for samples in levels(scene.settings.effective_replicates(), scene.settings.spp) {
-                tiles.par_iter_mut().filter(|tile| !tile.is_finished).try_for_each(|tile| {
+            for samples in levels(&scene.settings) {
+                tiles.par_iter_mut().try_for_each(|tile| {
                     let is_late = tile.samples > 0 && Instant::now() >= deadline;
                     if is_late { Ok(()) } else { tile.sample_up_to(scene, samples, control) }
                 })?;
@@ -69,7 +69,7 @@ pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderErr
         counts.paths += u64::from(tile.samples) * tile.area();
         counts.bad_samples += tile.bad_count;
         counts.first_bad_samples.append(&mut tile.bad);
-        for (x, y, pixel) in tile.into_pixels() {
+        for ((x, y), pixel) in tile.pixels() {
             pixels[y as usize * width as usize + x as usize] = pixel;
         }
     }

@@ -89,7 +89,7 @@ impl Departure {
 
     /// The unit geometric normal on the side that the incoming ray came from.
     #[inline]
-    pub(super) fn viewed_normal(&self) -> Vec3 {
+    pub fn viewed_normal(&self) -> Vec3 {
         if self.is_front { self.normal } else { -self.normal }
     }
 

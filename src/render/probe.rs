@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::offset::Departure;
+use super::tile::Tile;
 use super::{Geometry, Prepared};
 use crate::accel::Ray;
 use crate::light::{LightPlace, Receiver};
@@ -12,6 +13,11 @@ impl Prepared {
     /// What rays are traced in.
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
+    }
+
+    /// Columns and rows of the picture's pixels, in the order in which one thread renders them.
+    pub fn pixels(&self) -> Vec<(u32, u32)> {
+        Tile::all(self).iter().flat_map(Tile::places).collect()
     }
 
     /// The ray through a position on the film, in pixels from its upper left corner, and through the middle of the lens. Its

@@ -7,7 +7,9 @@ use glam::{DVec3, Vec3};
 use super::film::{Control, sample_pixel};
 use super::{Prepared, RenderError};
 use crate::color::Rgb;
+use crate::math::stats::relative_square;
 use crate::record::BadSample;
+use crate::settings::RenderSettings;
 
 /// The side of a tile in pixels: small enough to share the work out, large enough that rays stay together and that an error can be told
 /// from its pixels.
@@ -16,8 +18,6 @@ const SIDE: u32 = 16;
 pub(super) const NAMED_BAD_SAMPLES: usize = 16;
 /// The fewest samples a pixel by which an error is judged.
 const FEWEST_JUDGED: u32 = 16;
-/// Added to a square: dark pixels count by their absolute error, bright ones by the relative one.
-const FLOOR: f64 = 0.01;
 
 /// One pixel's result: means over all its samples, where a sample that hits nothing has albedo and normal 0; the depth is the mean
 /// over those that hit something.
@@ -58,7 +58,7 @@ pub(super) struct Tile {
     /// Samples a pixel so far.
     pub(super) samples: u32,
     /// The settings ask for no more.
-    pub(super) is_finished: bool,
+    is_finished: bool,
     pub(super) rays: u64,
     pub(super) bad_count: u64,
     /// The first of them.
@@ -71,9 +71,10 @@ pub(super) struct Tile {
     pixels: Vec<Pixel>,
 }
 
-/// Numbers of samples, each about twice the last, from as many as there are replicates up to `most`: after each a render may end.
-pub(super) fn levels(replicates: u32, most: u32) -> impl Iterator<Item = u32> {
-    let doubled = std::iter::successors(Some(replicates), |n| n.checked_mul(2));
+/// Numbers of samples, each about twice the last, from as many as there are replicates up to all: after each a render may end.
+pub(super) fn levels(settings: &RenderSettings) -> impl Iterator<Item = u32> + use<> {
+    let most = settings.spp;
+    let doubled = std::iter::successors(Some(settings.effective_replicates()), |n| n.checked_mul(2));
     doubled.take_while(move |n| *n < most).chain(std::iter::once(most))
 }
 
@@ -106,22 +107,22 @@ impl Tile {
 
     /// Takes all samples that the settings ask for.
     pub(super) fn finish(&mut self, scene: &Prepared, control: &Control) -> Result<(), RenderError> {
-        let settings = &scene.settings;
-        match settings.error {
-            None => self.sample_up_to(scene, settings.spp, control),
-            Some(_) => levels(settings.effective_replicates(), settings.spp).try_for_each(|samples| {
-                if self.is_finished { Ok(()) } else { self.sample_up_to(scene, samples, control) }
-            }),
+        for samples in levels(&scene.settings) {
+            self.sample_up_to(scene, samples, control)?;
         }
+        Ok(())
     }
 
-    /// Goes on until each pixel has `samples` of them, and judges whether that is enough.
+    /// Goes on, unless it is finished, until each pixel has `samples` of them, and judges whether that is enough.
     pub(super) fn sample_up_to(
         &mut self,
         scene: &Prepared,
         samples: u32,
         control: &Control,
     ) -> Result<(), RenderError> {
+        if self.is_finished {
+            return Ok(());
+        }
         let replicates = scene.settings.effective_replicates() as usize;
         let area = self.area() as usize;
         self.sums.resize(area, Sums::default());
@@ -172,6 +173,11 @@ impl Tile {
         self.sums[pixel] = sums;
     }
 
+    /// Columns and rows of its pixels.
+    pub(super) fn places(&self) -> impl Iterator<Item = (u32, u32)> {
+        (0..self.area() as usize).map(|pixel| self.place(pixel))
+    }
+
     fn place(&self, pixel: usize) -> (u32, u32) {
         let pixel = pixel as u32;
         (self.x0 + pixel % self.width, self.y0 + pixel / self.width)
@@ -191,13 +197,9 @@ impl Tile {
     }
 
     /// The finished pixels with their columns and rows in the picture.
-    pub(super) fn into_pixels(mut self) -> impl Iterator<Item = (u32, u32, Pixel)> {
+    pub(super) fn pixels(&mut self) -> impl Iterator<Item = ((u32, u32), Pixel)> {
         self.settle();
-        let pixels = std::mem::take(&mut self.pixels);
-        pixels.into_iter().enumerate().map(move |(i, pixel)| {
-            let (x, y) = self.place(i);
-            (x, y, pixel)
-        })
+        self.places().zip(self.pixels.iter().copied())
     }
 
     /// The error that is expected of the tile, as `bench` measures it: the mean over pixels and channels of the variance over the
@@ -205,7 +207,7 @@ impl Tile {
     fn error(&self) -> f64 {
         let of_pixel = |p: Pixel| {
             let (mean, variance) = (p.beauty.to_array(), p.variance.to_array());
-            let of_channel = |(m, v): (f32, f32)| f64::from(v) / (f64::from(m) * f64::from(m) + FLOOR);
+            let of_channel = |(m, v): (f32, f32)| relative_square(f64::from(v), f64::from(m));
             mean.into_iter().zip(variance).map(of_channel).sum::<f64>() / 3.0
         };
         self.so_far().map(of_pixel).sum::<f64>() / self.area() as f64
@@ -270,9 +272,12 @@ mod tests {
 
     #[test]
     fn a_render_may_end_at_doubled_numbers_of_samples() {
-        assert_eq!(levels(4, 50).collect::<Vec<_>>(), [4, 8, 16, 32, 50]);
-        assert_eq!(levels(4, 64).collect::<Vec<_>>(), [4, 8, 16, 32, 64]);
-        assert_eq!(levels(1, 1).collect::<Vec<_>>(), [1]);
+        let levels = |replicates, spp| {
+            levels(&RenderSettings { replicates, spp, ..RenderSettings::default() }).collect::<Vec<_>>()
+        };
+        assert_eq!(levels(4, 50), [4, 8, 16, 32, 50]);
+        assert_eq!(levels(4, 64), [4, 8, 16, 32, 64]);
+        assert_eq!(levels(1, 1), [1]);
     }
 
     #[test]

@@ -17,7 +17,7 @@ use super::summary::{mean, median};
 use super::{BenchError, Plan, Subject, Watch, error, timed};
 use crate::accel::Kernel;
 use crate::raster::Raster;
-use crate::render::{Geometry, Prepared};
+use crate::render::Geometry;
 
 /// What a scene's variants came to.
 #[derive(Clone, Debug)]
@@ -129,8 +129,8 @@ impl Contest<'_> {
         let mut planned = self.subject.planned(samples, seed)?;
         variant.change(&mut planned.settings);
         let own = &self.subject.loaded.geometry;
-        let geometry = Arc::clone(if variant.is_portable() { &self.portable } else { own });
-        let scene = Prepared::new(planned.scene, geometry, &planned.settings)?.with(variant.techniques());
+        let geometry = if variant.is_portable() { &self.portable } else { own };
+        let scene = self.subject.prepared(planned, geometry)?.with(variant.techniques());
         let what = format!("{}: {}, {samples} samples", self.subject.job.name, variant.name());
         let (rendered, seconds) = timed(&scene, &what, watch)?;
         let error = error::deviation(rendered.raster.picture(), self.reference.picture()).error;

@@ -2,7 +2,7 @@
 
 mod race;
 
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use rayon::prelude::*;
 
 pub use race::{Query, Rate, RayReport, SetReport, race, ray_table};
@@ -10,9 +10,6 @@ pub use race::{Query, Rate, RayReport, SetReport, race, ray_table};
 use crate::accel::{Bvh, Ray};
 use crate::math::{Frame, hash, warp};
 use crate::render::{Departure, Prepared};
-
-/// The side, in pixels, of the squares whose camera rays follow each other, as in a render.
-const TILE: u32 = 16;
 
 /// Rays of one kind, in the order of the picture's tiles.
 #[derive(Clone, Debug)]
@@ -66,21 +63,13 @@ pub fn ray_sets(scene: &Prepared) -> Vec<RaySet> {
 }
 
 fn camera_rays(scene: &Prepared) -> Vec<Ray> {
-    let (width, height) = scene.size();
-    let starts = |end: u32| (0..end).step_by(TILE as usize);
-    let tiles = starts(height).flat_map(|y| starts(width).map(move |x| (x, y)));
-    let pixels = tiles.flat_map(|(x0, y0)| {
-        let columns = x0..width.min(x0 + TILE);
-        (y0..height.min(y0 + TILE)).flat_map(move |y| columns.clone().map(move |x| (x, y)))
-    });
-    pixels.map(|(x, y)| scene.camera_ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5))).collect()
+    let through = |(x, y): (u32, u32)| scene.camera_ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+    scene.pixels().into_iter().map(through).collect()
 }
 
 /// Where a ray has hit.
 struct Foothold {
     departure: Departure,
-    /// On the side that the ray came from.
-    normal: Vec3,
     /// The ray's place among its like: what is random here depends on it.
     index: u64,
 }
@@ -98,9 +87,7 @@ impl Foothold {
 fn footholds(scene: &Prepared, tree: &Bvh, rays: &[Ray]) -> Vec<Foothold> {
     let foothold = |(index, ray): (usize, &Ray)| {
         let departure = scene.geometry().departure(ray, &tree.closest(ray)?);
-        let front = departure.normal();
-        let normal = if front.dot(ray.direction) > 0.0 { -front } else { front };
-        Some(Foothold { departure, normal, index: index as u64 })
+        Some(Foothold { departure, index: index as u64 })
     };
     rays.par_iter().enumerate().filter_map(foothold).collect()
 }
@@ -109,7 +96,9 @@ fn bounced(footholds: &[Foothold], bounce: u64) -> Vec<Ray> {
     let ray = |foothold: &Foothold| {
         let [u0, u1, ..] = foothold.numbers(bounce);
         let local = warp::cosine_hemisphere([u0, u1]);
-        foothold.departure.ray(Frame::from_normal(foothold.normal).world_from_local(local).normalize())
+        foothold
+            .departure
+            .ray(Frame::from_normal(foothold.departure.viewed_normal()).world_from_local(local).normalize())
     };
     footholds.par_iter().map(ray).collect()
 }
@@ -118,7 +107,7 @@ fn bounced(footholds: &[Foothold], bounce: u64) -> Vec<Ray> {
 fn shadow_rays(scene: &Prepared, footholds: &[Foothold]) -> Vec<Ray> {
     let ray = |foothold: &Foothold| {
         let ray = scene.shadow_ray(&foothold.departure, foothold.numbers(0))?;
-        (ray.direction.dot(foothold.normal) > 0.0).then_some(ray)
+        (ray.direction.dot(foothold.departure.viewed_normal()) > 0.0).then_some(ray)
     };
     footholds.par_iter().filter_map(ray).collect()
 }

