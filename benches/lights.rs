@@ -58,7 +58,7 @@ fn triangles(count: u32) -> Vec<EmissiveTriangle> {
 }
 
 fn lights(count: u32) -> Lights {
-    Lights::new(&triangles(count), &[], None, 2.0)
+    Lights::new(&triangles(count), &[], None, (Vec3::ZERO, 2.0))
 }
 
 fn receivers() -> Vec<Receiver> {
@@ -74,7 +74,7 @@ fn receivers() -> Vec<Receiver> {
 #[divan::bench(args = COUNTS)]
 fn build(bencher: Bencher<'_, '_>, count: u32) {
     let triangles = triangles(count);
-    bencher.bench(|| Lights::new(black_box(&triangles), &[], None, 2.0));
+    bencher.bench(|| Lights::new(black_box(&triangles), &[], None, (Vec3::ZERO, 2.0)));
 }
 
 #[divan::bench(args = COUNTS)]

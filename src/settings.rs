@@ -50,6 +50,34 @@ pub struct RenderSettings {
     /// Weigh light and BSDF samples against each other; without it light that `nee` samples is found by it alone.
     #[serde(skip_serializing_if = "is_true")]
     pub mis: bool,
+    /// Trace paths from the lights too, weighed against the others: they find what mirrors, glass and shiny things throw onto other surfaces.
+    #[serde(skip_serializing_if = "is_default")]
+    pub light_paths: Use,
+}
+
+/// Whether a technique is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Use {
+    /// Where it saves more than it costs, which a few samples tell before the render.
+    #[default]
+    Auto,
+    /// Wherever it can be.
+    Always,
+    /// Not at all.
+    Never,
+}
+
+impl Use {
+    /// The use of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "auto" => Some(Self::Auto),
+            "always" => Some(Self::Always),
+            "never" => Some(Self::Never),
+            _ => None,
+        }
+    }
 }
 
 // What a setting is by default is left out of identities, so that a setting more changes none.
@@ -174,6 +202,7 @@ impl Default for RenderSettings {
             integrator: Integrator::Path,
             nee: true,
             mis: true,
+            light_paths: Use::Auto,
         }
     }
 }

@@ -5,6 +5,7 @@
 
 mod bounds;
 mod distribution;
+mod emission;
 mod environment;
 mod environment_table;
 mod patch;
@@ -19,10 +20,12 @@ use crate::color::Rgb;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::material::Sides;
 use bounds::LightBounds;
+use emission::Emitters;
 use patch::Patch;
 use tree::LightTree;
 
 pub use distribution::Distribution;
+pub use emission::Emission;
 pub use environment::EnvironmentLight;
 pub use environment_table::{EnvironmentTable, EnvironmentTables, Partner};
 
@@ -63,6 +66,7 @@ pub struct Lights {
     environment: Option<EnvironmentLight>,
     /// Between all near lights, each far one, and the environment.
     selection: Distribution,
+    emitters: Emitters,
     /// Where among the near lights a triangle is, by the triangle's index, sorted.
     by_triangle: Vec<(u32, PatchPart)>,
 }
@@ -120,12 +124,12 @@ pub enum LightPlace {
 }
 
 impl Lights {
-    /// Lights of a scene whose triangles fit into a sphere of `scene_radius` (metres, above 0).
+    /// Lights of a scene whose triangles fit into a sphere of this centre and radius (metres, above 0).
     pub fn new(
         triangles: &[EmissiveTriangle],
         punctual: &[Light],
         environment: Option<EnvironmentLight>,
-        scene_radius: f32,
+        (center, scene_radius): (Vec3, f32),
     ) -> Self {
         let (patches, by_triangle) = patches(triangles);
         let (far, local): (Vec<Light>, Vec<Light>) = punctual
@@ -146,7 +150,11 @@ impl Lights {
         let mut shares = vec![powers.iter().sum()];
         shares.extend(far.iter().map(|light| punctual::power(light, scene_radius)));
         let disk = std::f64::consts::PI * f64::from(scene_radius) * f64::from(scene_radius);
-        shares.push(environment.as_ref().map_or(0.0, |e| e.sampled_luminance() * disk));
+        let sky = environment.as_ref().map_or(0.0, |e| e.sampled_luminance() * disk);
+        shares.push(sky);
+        let selection = Distribution::new(&with_floor(&shares));
+        let share = selection.probability(far.len() + 1);
+        let emitters = Emitters::new(&powers[..patches.len()], sky, share, (center, scene_radius));
         let near =
             patches.into_iter().map(NearLight::Patch).chain(local.into_iter().map(NearLight::Punctual));
         Self {
@@ -154,7 +162,8 @@ impl Lights {
             tree: LightTree::new(&bounds),
             far,
             environment,
-            selection: Distribution::new(&with_floor(&shares)),
+            selection,
+            emitters,
             by_triangle,
         }
     }
@@ -195,11 +204,20 @@ impl Lights {
     /// The solid-angle density of [`Self::sample`] for `receiver`, at a point of an emitting triangle that lies `distance` along the
     /// unit direction `wi` from there; 0 for triangles that are not lights.
     pub fn pdf_triangle(&self, receiver: &Receiver, triangle: u32, wi: Vec3, distance: f32) -> f32 {
-        let Ok(found) = self.by_triangle.binary_search_by_key(&triangle, |&(t, _)| t) else { return 0.0 };
-        let PatchPart { light, index } = self.by_triangle[found].1;
-        let NearLight::Patch(patch) = &self.near[light as usize] else { return 0.0 };
+        let Some((patch, PatchPart { light, index })) = self.patch_of(triangle) else { return 0.0 };
         let chance = self.selection.probability(0) * self.tree.probability(receiver, light as usize);
         if chance > 0.0 { chance * patch.pdf(receiver.point, index, wi, distance) } else { 0.0 }
+    }
+
+    /// The patch that a triangle belongs to, if it is a light.
+    #[inline]
+    fn patch_of(&self, triangle: u32) -> Option<(&Patch, PatchPart)> {
+        let found = self.by_triangle.binary_search_by_key(&triangle, |&(t, _)| t).ok()?;
+        let part = self.by_triangle[found].1;
+        match &self.near[part.light as usize] {
+            NearLight::Patch(patch) => Some((patch, part)),
+            NearLight::Punctual(_) => None,
+        }
     }
 
     /// The environment's radiance from the unit direction `wi`, and the solid-angle density of [`Self::sample`] there.
@@ -307,7 +325,7 @@ mod tests {
         unit_f32(combine(u64::from(i), salt) as u32)
     }
 
-    fn quad_lights() -> Vec<EmissiveTriangle> {
+    pub(super) fn quad_lights() -> Vec<EmissiveTriangle> {
         let v = |x: f32, z: f32| Vec3::new(x, 2.0, z);
         [[v(-1.0, -1.0), v(1.0, -1.0), v(1.0, 1.0)], [v(-1.0, -1.0), v(1.0, 1.0), v(-1.0, 1.0)]]
             .into_iter()
@@ -326,14 +344,14 @@ mod tests {
         Receiver { point, normal: Vec3::Y, sides: Sides::Front }
     }
 
-    fn numbers(i: u32) -> [f32; 4] {
+    pub(super) fn numbers(i: u32) -> [f32; 4] {
         [1, 2, 3, 4].map(|salt| random(i, salt))
     }
 
     /// Form factor of a square light above a point, by sampling and by the closed formula.
     #[test]
     fn sampled_irradiance_of_a_square_is_the_analytic_one() {
-        let lights = Lights::new(&quad_lights(), &[], None, 3.0);
+        let lights = Lights::new(&quad_lights(), &[], None, (Vec3::ZERO, 3.0));
         let n = 40_000;
         let sum: f64 = (0..n)
             .filter_map(|i| lights.sample(&floor(Vec3::ZERO), numbers(i)))
@@ -348,7 +366,7 @@ mod tests {
 
     #[test]
     fn triangle_pdf_is_that_of_the_sample() {
-        let lights = Lights::new(&quad_lights(), &[], None, 3.0);
+        let lights = Lights::new(&quad_lights(), &[], None, (Vec3::ZERO, 3.0));
         for i in 0..200 {
             let from = floor(Vec3::new(random(i, 5), 0.3, random(i, 6)));
             let s = lights.sample(&from, numbers(i)).unwrap();
@@ -363,7 +381,7 @@ mod tests {
     /// Symmetric lights are told apart by their power alone.
     #[test]
     fn lights_are_chosen_by_power() {
-        let lights = Lights::new(&quad_lights(), &[], None, 3.0);
+        let lights = Lights::new(&quad_lights(), &[], None, (Vec3::ZERO, 3.0));
         let bright = (0..1000)
             .filter(|&i| {
                 let s =
@@ -383,7 +401,7 @@ mod tests {
         let mut turned = EmissiveTriangle { triangle: 21, ..again };
         turned.vertices.swap(0, 1);
         lights.extend([again, turned]);
-        let lights = Lights::new(&lights, &[], None, 3.0);
+        let lights = Lights::new(&lights, &[], None, (Vec3::ZERO, 3.0));
         assert_eq!(lights.counts(), [3, 0, 0]);
         let pdf = |triangle| lights.pdf_triangle(&floor(Vec3::ZERO), triangle, Vec3::Y, 2.0);
         assert!(pdf(20) == pdf(10) && pdf(20) > 0.0);
@@ -397,7 +415,7 @@ mod tests {
             Partner::None,
             &EnvironmentTables::default(),
         );
-        let lights = Lights::new(&[], &[], Some(black), 1.0);
+        let lights = Lights::new(&[], &[], Some(black), (Vec3::ZERO, 1.0));
         assert!(lights.is_empty());
         assert!(lights.sample(&floor(Vec3::ZERO), [0.5; 4]).is_none());
         assert_eq!(lights.environment(Vec3::Y), Some((Rgb::BLACK, 0.0)));

@@ -40,6 +40,8 @@ pub(super) struct Patch {
     center: Vec3,
     /// The squared distance from the centre beyond which the patch is sampled by area: see [`SMALL`].
     far_squared: f32,
+    /// One over the area in m².
+    per_area: f32,
     /// Luminance of the mean radiance times the area, in W/sr.
     intensity: f64,
     sides: Sides,
@@ -100,7 +102,8 @@ impl Patch {
         let radius_squared = corners.map(|c| c.distance_squared(center)).into_iter().fold(0.0, f32::max);
         let far_squared = radius_squared / SMALL.sqr();
         let (sides, is_mirrored) = (t.sides, t.is_mirrored);
-        Self { pivot, ring, wedges, count, center, far_squared, intensity, sides, is_mirrored }
+        let per_area = (1.0 / area) as f32;
+        Self { pivot, ring, wedges, count, center, far_squared, per_area, intensity, sides, is_mirrored }
     }
 
     /// Two triangles that share an edge and a plane, wind the same way round and emit alike; None if these don't.
@@ -197,17 +200,41 @@ impl Patch {
         Some(self.wedges[k].found(wi, barycentric, 1.0 / total))
     }
 
-    /// As [`Self::sample`], uniform by area.
-    fn sample_area(&self, from: Vec3, u: [f32; 2]) -> Option<PatchSample> {
+    /// The sides that emit.
+    pub(super) fn sides(&self) -> Sides {
+        self.sides
+    }
+
+    /// A triangle and a point of it, barycentric, uniform by area; and the density per m².
+    #[inline]
+    pub(super) fn point(&self, u: [f32; 2]) -> (u32, [f32; 3], f32) {
+        let (k, barycentric) = self.point_of_wedge(u);
+        let found = self.wedges[k].found(Vec3::ZERO, barycentric, self.pdf_point());
+        (found.triangle, found.barycentric, found.pdf)
+    }
+
+    /// The density of [`Self::point`] per m².
+    #[inline]
+    pub(super) fn pdf_point(&self) -> f32 {
+        self.per_area
+    }
+
+    #[inline]
+    fn point_of_wedge(&self, u: [f32; 2]) -> (usize, [f32; 3]) {
         let first = self.wedges[0].share;
         let (k, u0) = match self.count {
             2 if u[0] >= first => (1, ((u[0] - first) / (1.0 - first)).min(1.0)),
             _ => (0, u[0] / first),
         };
         let [b1, b2] = warp::uniform_triangle([u0, u[1]]);
-        let barycentric = [1.0 - b1 - b2, b1, b2];
+        (k, [1.0 - b1 - b2, b1, b2])
+    }
+
+    /// As [`Self::sample`], uniform by area.
+    fn sample_area(&self, from: Vec3, u: [f32; 2]) -> Option<PatchSample> {
+        let (k, barycentric) = self.point_of_wedge(u);
         let [v0, v1, v2] = self.wedge_corners(k).map(|v| v - from);
-        let to_light = v0 * barycentric[0] + v1 * b1 + v2 * b2;
+        let to_light = v0 * barycentric[0] + v1 * barycentric[1] + v2 * barycentric[2];
         let distance = to_light.length();
         let wi = to_light / distance;
         let pdf = self.wedges[k].pdf_area(wi, distance)?;

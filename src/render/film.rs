@@ -7,6 +7,7 @@ use glam::Vec2;
 use rayon::prelude::*;
 
 use super::integrators::integrate;
+use super::light_image::LightImage;
 use super::path::{PathSample, ReplayVertex};
 use super::tile::{NAMED_BAD_SAMPLES, Pixel, Tile, levels};
 use super::{Prepared, RenderError};
@@ -46,30 +47,42 @@ pub struct Rendered {
 pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderError> {
     let (width, height) = scene.size();
     let most_paths = u64::from(width) * u64::from(height) * u64::from(scene.settings.spp);
-    control.total_paths.store(most_paths, Ordering::Relaxed);
+    let from_lights = scene
+        .light_paths
+        .as_ref()
+        .map_or(0, |plan| u64::from(plan.per_sample) * u64::from(scene.settings.spp));
+    control.total_paths.store(most_paths + from_lights, Ordering::Relaxed);
     let mut tiles = Tile::all(scene);
-    match control.time_limit {
-        None => tiles.par_iter_mut().try_for_each(|tile| tile.finish(scene, control))?,
-        Some(limit) => {
-            let deadline = Instant::now() + limit;
-            // Every tile gets its first samples, also after the deadline: a picture has no holes.
-            for samples in levels(&scene.settings) {
-                tiles.par_iter_mut().try_for_each(|tile| {
-                    let is_late = tile.samples > 0 && Instant::now() >= deadline;
-                    if is_late { Ok(()) } else { tile.sample_up_to(scene, samples, control) }
-                })?;
-            }
+    let mut lit = LightImage::new(scene);
+    let deadline = control.time_limit.map(|limit| Instant::now() + limit);
+    let may_end_early = deadline.is_some() || scene.settings.error.is_some();
+    for samples in levels(&scene.settings).filter(|&n| may_end_early || n == scene.settings.spp) {
+        // Every tile gets its first samples, also after the deadline: a picture has no holes.
+        let is_late = || deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        if samples > scene.settings.effective_replicates() && is_late() {
+            break;
         }
+        lit.sample_up_to(scene, samples, control)?;
+        tiles.par_iter_mut().try_for_each(|tile| {
+            let ends = tile.samples > 0 && is_late();
+            if ends { Ok(()) } else { tile.sample_up_to(scene, samples, &lit, control) }
+        })?;
     }
 
     let mut pixels = vec![Pixel::default(); width as usize * height as usize];
-    let mut counts = Counts { triangles: scene.geometry.triangle_count() as u64, ..Counts::default() };
+    let rays = lit.rays;
+    let mut counts = Counts {
+        rays,
+        bad_samples: lit.bad_count,
+        triangles: scene.geometry.triangle_count() as u64,
+        ..Counts::default()
+    };
     for mut tile in tiles {
         counts.rays += tile.rays;
         counts.paths += u64::from(tile.samples) * tile.area();
         counts.bad_samples += tile.bad_count;
         counts.first_bad_samples.append(&mut tile.bad);
-        for ((x, y), pixel) in tile.pixels() {
+        for ((x, y), pixel) in tile.pixels(&lit) {
             pixels[y as usize * width as usize + x as usize] = pixel;
         }
     }

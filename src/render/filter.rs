@@ -54,6 +54,34 @@ impl FilterSampler {
     }
 }
 
+impl FilterSampler {
+    /// How far from the pixel's centre offsets reach, in pixels.
+    pub(super) fn radius(&self) -> f32 {
+        match self {
+            Self::Box { radius } | Self::Tent { radius } => *radius,
+            Self::Tabulated(table) => table[STEPS],
+            Self::Point => 0.0,
+        }
+    }
+
+    /// The density of [`Self::offset`] per pixel; 0 for [`Self::Point`], which has none.
+    pub(super) fn density(&self, offset: f32) -> f32 {
+        match self {
+            // Half open, so that a position between two pixels belongs to one.
+            Self::Box { radius } if -radius <= offset && offset < *radius => 0.5 / radius,
+            Self::Tent { radius } => ((radius - offset.abs()) / (radius * radius)).max(0.0),
+            Self::Tabulated(table) => {
+                let after = table.partition_point(|&x| x <= offset);
+                if after == 0 || after > STEPS {
+                    return 0.0;
+                }
+                1.0 / (STEPS as f32 * (table[after] - table[after - 1]))
+            }
+            Self::Box { .. } | Self::Point => 0.0,
+        }
+    }
+}
+
 /// The four-term Blackman-Harris window over [-1, 1] (Harris 1978).
 fn blackman_harris(x: f64) -> f64 {
     let phase = std::f64::consts::PI * (x + 1.0);
@@ -83,6 +111,21 @@ fn invert(density: &dyn Fn(f64) -> f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn density_is_the_slope_of_the_cumulative_distribution() {
+        for filter in [Filter::Box, Filter::Tent, Filter::BlackmanHarris] {
+            let sampler = FilterSampler::new(filter, None);
+            for u in [0.05f32, 0.2, 0.5, 0.83] {
+                let step = 1e-3;
+                let expected = 2.0 * step / (sampler.offset(u + step) - sampler.offset(u - step));
+                let density = sampler.density(sampler.offset(u));
+                assert!((density / expected - 1.0).abs() < 0.02, "{filter:?} {u}: {density} {expected}");
+            }
+            assert_eq!(sampler.density(sampler.radius() * 1.01), 0.0);
+            assert_eq!(sampler.density(-sampler.radius() * 1.01), 0.0);
+        }
+    }
 
     /// Mean and variance of the offsets against the filter's own moments by quadrature.
     #[test]

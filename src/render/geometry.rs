@@ -23,8 +23,8 @@ pub struct Geometry {
     /// The instance and the triangle's index in its mesh.
     origins: Vec<(u32, u32)>,
     instances: Vec<PlacedMesh>,
-    /// The radius, at least a tiny one, of a sphere around everything.
-    pub(super) radius: f32,
+    /// The centre, relative to [`Self::origin`], and the radius, at least a tiny one, of a sphere around everything.
+    pub(super) sphere: (Vec3, f32),
 }
 
 #[derive(Clone, Debug)]
@@ -121,7 +121,14 @@ impl Geometry {
                 Triangle::new(vertices, instances[instance as usize].handedness)
             })
             .collect();
-        Ok(Self { bvh: Bvh::build(&vertices)?, origin, triangles, origins, instances, radius })
+        Ok(Self {
+            bvh: Bvh::build(&vertices)?,
+            origin,
+            triangles,
+            origins,
+            instances,
+            sphere: (center - origin, radius),
+        })
     }
 
     /// Where in the world the positions of rays and hits are 0.

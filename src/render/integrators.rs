@@ -7,8 +7,9 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::Prepared;
+use super::from_light::FromLight;
 use super::path::{
-    PathSample, ReplayVertex, Strategies, direct_light, first_hit, next_surface, trace, transmittance,
+    PathSample, ReplayVertex, Strategies, Ways, direct_light, first_hit, next_surface, trace, transmittance,
 };
 use super::surface::Surface;
 use crate::accel::Ray;
@@ -61,7 +62,7 @@ fn at_first(
     value: impl FnOnce(&Surface<'_>, &mut u64) -> Rgb,
 ) -> PathSample {
     let mut path = PathSample { rays: 1, ..PathSample::default() };
-    if let Some(hit) = next_surface(scene, sampler, 1, ray) {
+    if let Some(hit) = next_surface(scene, sampler, 1, ray, ray.direction) {
         let surface = Surface::new(scene, ray, &hit);
         path.first = Some(first_hit(scene, ray, &surface, surface.shading(scene, &mut None).as_ref()));
         path.radiance = value(&surface, &mut path.rays);
@@ -130,7 +131,8 @@ fn emitter_check(scene: &Prepared, sampler: &Sampler, surface: &Surface<'_>, ray
 }
 
 /// Lights are found by sampling them.
-const LIGHTS_ALONE: Strategies = Strategies { nee: true, mis: false };
+const LIGHTS_ALONE: Ways =
+    Ways { strategies: Strategies { nee: true, mis: false }, from_light: FromLight::CAMERA };
 /// A specular path goes on with this probability, after as many vertices as few are longer than.
 const SURVIVAL: f32 = 0.95;
 const ROULETTE_START: u32 = 4;
@@ -146,7 +148,7 @@ fn whitted(
     let (mut ray, mut beta, mut medium) = (camera_ray, Rgb::WHITE, scene.camera_medium);
     for vertex in 1.. {
         path.rays += 1;
-        let Some(hit) = next_surface(scene, sampler, vertex, &ray) else {
+        let Some(hit) = next_surface(scene, sampler, vertex, &ray, ray.direction) else {
             if let Some((radiance, _)) = scene.lights.environment(ray.direction) {
                 path.radiance += beta * radiance * super::medium::transmittance(medium, f32::INFINITY);
             }

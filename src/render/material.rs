@@ -160,6 +160,12 @@ impl PreparedMaterial {
         matches!(self.bsdf, Scattering::Constant(_))
     }
 
+    /// Its normals depend on the viewer.
+    #[inline]
+    pub(super) fn has_normal_map(&self) -> bool {
+        self.normal_map.is_some()
+    }
+
     /// All of it is there.
     pub(super) fn covers_all(&self) -> bool {
         matches!(self.opacity, Covering::Opaque)

@@ -5,13 +5,17 @@
 mod camera;
 mod film;
 mod filter;
+mod from_light;
 mod geometry;
 mod integrators;
+mod light_image;
+mod light_path;
 mod mapped_normal;
 mod material;
 mod medium;
 mod offset;
 mod path;
+mod pilot;
 mod prepare;
 mod probe;
 mod range;

@@ -58,6 +58,12 @@ pub(super) fn offset(point: Vec3, error: f32, normal: Vec3, direction: Vec3) -> 
     point + normal * error.copysign(direction.dot(normal))
 }
 
+/// The ray from a free place to a light or a place off its surface, ending just before it.
+#[inline]
+pub(super) fn ray_to(origin: Vec3, target: Vec3) -> Ray {
+    Ray { t_max: BEFORE_LIGHT, ..Ray::new(origin, target - origin) }
+}
+
 /// A hit point, and where rays start that leave it.
 #[derive(Clone, Copy, Debug)]
 pub struct Departure {

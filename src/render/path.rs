@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 use super::Prepared;
+use super::from_light::{FromLight, with_light};
 use super::medium::{self, Medium};
 use super::offset::offset;
 use super::surface::{Shading, Surface};
@@ -44,17 +45,17 @@ const ROULETTE_START: u32 = 4;
 /// And lets no more than this survive, so that a path through lossless surfaces ends.
 const MAX_SURVIVAL: f32 = 0.95;
 
-/// The power heuristic (Veach 1997) with exponent 2, safe from overflow.
+/// The power heuristic (Veach 1997) with exponent 2, safe from overflow: the weight of a sample by its density and those of the others.
 #[inline]
-fn power_heuristic(pdf: f32, other: f32) -> f32 {
+pub(super) fn power_heuristic(pdf: f32, others: [f32; 2]) -> f32 {
     if !pdf.is_finite() {
         return 1.0;
     }
-    let ratio = other / pdf;
-    1.0 / (1.0 + ratio * ratio)
+    let [a, b] = others.map(|other| other / pdf);
+    1.0 / (1.0 + a * a + b * b)
 }
 
-/// Which of the two ways to find a light count. All combinations have the same expectation.
+/// Which of the ways to find a light count. All combinations have the same expectation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Strategies {
     pub(super) nee: bool,
@@ -62,25 +63,35 @@ pub(super) struct Strategies {
 }
 
 impl Strategies {
-    /// What a BSDF sample of density `pdf` counts that found light which light sampling finds with density `pdf_light`.
+    /// What a path counts that met a light which light paths find `from_light` times as densely. `pdfs`: the density of the BSDF sample that
+    /// led there, and that of sampling the light; none if it can't be sampled.
     #[inline]
-    fn w_bsdf(self, pdf: f32, pdf_light: f32) -> f32 {
+    fn w_bsdf(self, pdfs: Option<(f32, f32)>, from_light: f32) -> f32 {
+        let (pdf, pdf_light) = pdfs.unwrap_or((1.0, 0.0));
         match self {
-            Self { nee: true, mis: true } => power_heuristic(pdf, pdf_light),
+            Self { nee: true, mis: true } => power_heuristic(1.0, [pdf_light / pdf, from_light]),
             Self { nee: true, mis: false } if pdf_light > 0.0 => 0.0,
             _ => 1.0,
         }
     }
 
-    /// What a light sample of density `pdf` counts that BSDF sampling finds with density `pdf_bsdf`.
+    /// What a light sample of density `pdf` counts that BSDF sampling finds with density `pdf_bsdf` and light paths with `pdf_path`.
     #[inline]
-    fn w_light(self, pdf: f32, pdf_bsdf: f32) -> f32 {
+    fn w_light(self, pdf: f32, pdf_bsdf: f32, pdf_path: f32) -> f32 {
         match self {
-            Self { nee: true, mis: true } => power_heuristic(pdf, pdf_bsdf),
+            Self { nee: true, mis: true } => power_heuristic(pdf, [pdf_bsdf, pdf_path]),
             Self { nee: true, mis: false } => 1.0,
             Self { nee: false, .. } => 0.0,
         }
     }
+}
+
+/// How light is found besides sampling it here.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ways {
+    pub(super) strategies: Strategies,
+    /// What light paths know of the path so far.
+    pub(super) from_light: FromLight,
 }
 
 /// Traces one path. `inspect` is called at each vertex with the radiance gathered so far.
@@ -100,13 +111,16 @@ pub(super) fn trace(
     let mut eta_scale = 1.0f32;
     let mut scatterings = 0;
     let mut medium = scene.camera_medium;
+    let mut from_light = FromLight::CAMERA;
 
     for vertex in 1.. {
         // Find the next surface, or leave the scene.
         path.rays += 1;
-        let Some(hit) = next_surface(scene, sampler, vertex, &ray) else {
+        let Some(hit) = next_surface(scene, sampler, vertex, &ray, ray.direction) else {
             if let Some((radiance, pdf_light)) = scene.lights.environment(ray.direction) {
-                let w_bsdf = last_scatter.map_or(1.0, |s| strategies.w_bsdf(s.pdf, pdf_light));
+                let emission = || scene.lights.pdf_emission_far(pdf_light);
+                let w_bsdf = strategies
+                    .w_bsdf(last_scatter.map(|s| (s.pdf, pdf_light)), from_light.at_light(emission));
                 path.radiance += beta * radiance * w_bsdf * medium::transmittance(medium, f32::INFINITY);
             }
             break;
@@ -120,12 +134,12 @@ pub(super) fn trace(
         // Add what the surface sends out by itself.
         let emitted = surface.emitted(scene);
         if !emitted.is_black() {
-            let w_bsdf = last_scatter.map_or(1.0, |s| {
+            let pdfs = last_scatter.map(|s| {
                 let distance = (surface.point - s.receiver.point).length();
-                let pdf_light =
-                    scene.lights.pdf_triangle(&s.receiver, surface.triangle, ray.direction, distance);
-                strategies.w_bsdf(s.pdf, pdf_light)
+                (s.pdf, scene.lights.pdf_triangle(&s.receiver, surface.triangle, ray.direction, distance))
             });
+            let emission = || scene.lights.pdf_emission(surface.triangle);
+            let w_bsdf = strategies.w_bsdf(pdfs, from_light.at_light(emission));
             path.radiance += beta * emitted * w_bsdf;
         }
         if last_scatter.is_none() {
@@ -152,13 +166,15 @@ pub(super) fn trace(
             continue;
         }
 
+        from_light.arrive(scene, &camera_ray, &surface);
         // Sample a light, unless no light could be reflected from it.
         let may_reflect = !(shading.bsdf.is_delta() && scene.techniques.useful_light);
         if may_reflect && !scene.lights.is_empty() {
             let u = sampler.set(vertex, Purpose::Light);
             if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
-                path.radiance += beta
-                    * direct_light(scene, &surface, &shading, &sample, strategies, medium, &mut path.rays);
+                let ways = Ways { strategies, from_light };
+                path.radiance +=
+                    beta * direct_light(scene, &surface, &shading, &sample, ways, medium, &mut path.rays);
             }
         }
 
@@ -187,6 +203,12 @@ pub(super) fn trace(
         scatterings += 1;
         last_scatter =
             (!sample.lobe.is_delta()).then(|| LastScatter { receiver: surface.receiver(), pdf: sample.pdf });
+        match last_scatter {
+            None => from_light.mirror(scene, &surface, &shading, wi),
+            Some(_) => {
+                from_light.scatter(from_light.towards(scene, &surface, &shading, wi), sample.pdf);
+            }
+        }
 
         // End paths that carry little, and let survivors stand for them.
         if scatterings > ROULETTE_START && scene.techniques.roulette {
@@ -201,16 +223,22 @@ pub(super) fn trace(
 }
 
 /// The nearest surface that is there for this path: a partly transparent one lets its share of paths pass. Each triangle decides
-/// for itself, so that surfaces in the same plane are as transparent to paths as they are to shadow rays.
+/// for itself, so that surfaces in the same plane are as transparent to paths as they are to shadow rays. `view` is the direction along the
+/// ray in which the camera looks.
 #[inline]
-pub(super) fn next_surface(scene: &Prepared, sampler: &Sampler, vertex: u32, ray: &Ray) -> Option<Hit> {
+pub(super) fn next_surface(
+    scene: &Prepared,
+    sampler: &Sampler,
+    vertex: u32,
+    ray: &Ray,
+    view: Vec3,
+) -> Option<Hit> {
     let bvh = &scene.geometry.bvh;
     if scene.all_covered {
         return bvh.closest(ray);
     }
     bvh.closest_where(ray, |hit| {
-        let alpha =
-            scene.material_of(hit.triangle).alpha(&scene.scene, &scene.geometry.at(hit), ray.direction);
+        let alpha = scene.material_of(hit.triangle).alpha(&scene.scene, &scene.geometry.at(hit), view);
         alpha >= 1.0 || (alpha > 0.0 && sampler.set_of(vertex, Purpose::Opacity, hit.triangle)[0] < alpha)
     })
 }
@@ -222,7 +250,7 @@ pub(super) fn direct_light(
     surface: &Surface<'_>,
     shading: &Shading<'_>,
     sample: &LightSample,
-    strategies: Strategies,
+    Ways { strategies, from_light }: Ways,
     arrived: Medium,
     rays: &mut u64,
 ) -> Rgb {
@@ -245,11 +273,17 @@ pub(super) fn direct_light(
             let radiance = material.emitted(&scene.scene, &light, normal.dot(sample.wi) < 0.0) * coverage;
             let (point, error) = light.position();
             let target = offset(point, error, normal, -sample.wi);
-            (radiance, strategies.w_light(sample.pdf, pdf_bsdf), surface.reach(sample.wi, target))
+            let towards = from_light.towards(scene, surface, shading, sample.wi);
+            let pdf_path = with_light(towards, || scene.lights.pdf_emission(triangle));
+            (radiance, strategies.w_light(sample.pdf, pdf_bsdf, pdf_path), surface.reach(sample.wi, target))
         }
         LightPlace::Point { position, radiance } => (radiance, 1.0, surface.reach(sample.wi, position)),
         LightPlace::Far { radiance, is_delta } => {
-            let w_light = if is_delta { 1.0 } else { strategies.w_light(sample.pdf, pdf_bsdf) };
+            let pdf_path = || {
+                let towards = from_light.towards(scene, surface, shading, sample.wi);
+                with_light(towards, || scene.lights.pdf_emission_far(sample.pdf))
+            };
+            let w_light = if is_delta { 1.0 } else { strategies.w_light(sample.pdf, pdf_bsdf, pdf_path()) };
             (radiance, w_light, surface.leave(sample.wi))
         }
     };
@@ -348,10 +382,10 @@ mod tests {
     #[test]
     fn weights_of_two_strategies_sum_to_one() {
         for (a, b) in [(1.0, 2.0), (1e30, 1e-30), (1e-38, 1e38), (5.0, 0.0)] {
-            let sum = power_heuristic(a, b) + power_heuristic(b, a);
+            let sum = power_heuristic(a, [b, 0.0]) + power_heuristic(b, [0.0, a]);
             // A strategy that can't make the sample has no say.
             assert!((sum - 1.0).abs() < 1e-6 || b == 0.0, "{a} {b}: {sum}");
-            assert!(power_heuristic(a, b).is_finite());
+            assert!(power_heuristic(a, [b, 0.0]).is_finite());
         }
     }
 }

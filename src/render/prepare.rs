@@ -2,18 +2,29 @@
 
 use std::sync::Arc;
 
+use glam::Vec2;
+
 use super::RenderError;
 use super::camera::FilmCamera;
 use super::filter::FilterSampler;
 use super::geometry::Geometry;
+use super::light_path::LightPaths;
 use super::material::PreparedMaterial;
 use super::medium::Medium;
+use super::pilot;
 use super::range;
 use super::techniques::Techniques;
+use crate::accel::Ray;
 use crate::light::{EmissiveTriangle, EnvironmentLight, EnvironmentTables, Lights, Partner};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Camera, MaterialId, Named, Scene};
-use crate::settings::{Integrator, RenderSettings};
+use crate::settings::{Integrator, RenderSettings, Use};
+
+/// One light path for so many camera paths. Their noise is little, so few will do: in the Cornell boxes an eighth to a half of a light
+/// path for each camera path is equally good.
+const PIXELS_PER_PATH: u32 = 4;
+/// Sums of light paths over pixels and replicates, of 24 bytes each.
+const MOST_SUMS: u64 = 1 << 28;
 
 /// The size of images where neither settings nor camera say one.
 const DEFAULT_SIZE: (u32, u32) = (640, 480);
@@ -34,6 +45,10 @@ pub struct Prepared {
     pub(super) height: u32,
     /// What the camera is in: the inside of the first interface along its axis, if that is met from behind.
     pub(super) camera_medium: Medium,
+    /// Some medium between surfaces absorbs light.
+    has_media: bool,
+    /// Paths start from lights too, or why not.
+    pub(super) light_paths: Result<LightPaths, String>,
     /// No surface is partly there, so that a ray needs no look at materials.
     pub(super) all_covered: bool,
     /// No surface lets shadow rays pass, so that they need none either.
@@ -79,14 +94,18 @@ impl Prepared {
         let all = |is: fn(&PreparedMaterial) -> bool| {
             scene.instances.iter().all(|i| is(&materials[i.material.0 as usize]))
         };
-        let camera_medium = medium_around(&film_camera, &geometry, |triangle| {
+        let camera_medium = medium_around(&film_camera.axis_ray(), &geometry, |triangle| {
             &materials[scene.instances[geometry.instance_of(triangle)].material.0 as usize]
         });
         let all_covered = all(PreparedMaterial::covers_all);
         let all_opaque = all(PreparedMaterial::blocks_shadow_rays);
-        Ok(Self {
+        let filter = FilterSampler::new(settings.filter, settings.filter_radius);
+        let light_paths = light_paths(settings, &film_camera, &filter, &lights, width * height);
+        let mut prepared = Self {
             camera: film_camera,
-            filter: FilterSampler::new(settings.filter, settings.filter_radius),
+            filter,
+            light_paths,
+            has_media: materials.iter().any(|m| m.absorption.is_some()),
             settings: settings.clone(),
             material_of: scene.instances.iter().map(|i| i.material).collect(),
             materials,
@@ -99,7 +118,14 @@ impl Prepared {
             techniques: Techniques::default(),
             scene,
             geometry,
-        })
+        };
+        if let (Use::Auto, Ok(plan)) = (settings.light_paths, &prepared.light_paths) {
+            let worth = pilot::light_paths(&prepared, plan);
+            if !worth.pays() {
+                prepared.light_paths = Err(format!("they would leave {worth}"));
+            }
+        }
+        Ok(prepared)
     }
 
     /// The same with these techniques alone, for measuring what the others are worth.
@@ -111,6 +137,9 @@ impl Prepared {
         }
         if !techniques.lobes_by_albedo {
             self.materials = self.materials.into_iter().map(PreparedMaterial::with_equal_lobes).collect();
+        }
+        if !techniques.light_paths {
+            self.light_paths = Err("left out".to_owned());
         }
         self.all_covered &= techniques.coverage;
         self.all_opaque &= techniques.coverage;
@@ -140,6 +169,9 @@ impl Prepared {
         if !self.scene.materials.iter().any(|m| m.item.transmits()) {
             skipped.push("transmission: nothing lets light through".to_owned());
         }
+        if let Err(why) = &self.light_paths {
+            skipped.push(format!("light paths: {why}"));
+        }
         for (count, what) in
             [(areas, "area lights"), (punctual, "punctual lights"), (environments, "environment")]
         {
@@ -148,6 +180,37 @@ impl Prepared {
             }
         }
         skipped
+    }
+
+    /// The position is within the filter of a pixel of the picture.
+    pub(super) fn is_on_film(&self, film: Vec2) -> bool {
+        let beyond = self.filter.radius() - 0.5;
+        let inside = |x: f32, length: u32| x > -beyond && x < length as f32 + beyond;
+        inside(film.x, self.width) && inside(film.y, self.height)
+    }
+
+    /// The pixels whose filter a position on the film is in, with their filter's density there.
+    #[inline]
+    pub(super) fn pixels_at(&self, film: Vec2, mut each: impl FnMut(u32, u32, f32)) {
+        let radius = self.filter.radius();
+        let reach = |x: f32, length: u32| {
+            let first = (x - radius - 0.5).ceil().max(0.0) as u32;
+            first..((x + radius - 0.5).floor() + 1.0).clamp(0.0, length as f32) as u32
+        };
+        for y in reach(film.y, self.height) {
+            for x in reach(film.x, self.width) {
+                let offset = film - Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                each(x, y, self.filter.density(offset.x) * self.filter.density(offset.y));
+            }
+        }
+    }
+
+    /// What a ray that starts anywhere is in: the inside of the first interface on its way, if that is met from behind.
+    pub(super) fn medium_around(&self, ray: &Ray) -> Medium {
+        if !self.has_media {
+            return None;
+        }
+        medium_around(ray, &self.geometry, |triangle| self.material_of(triangle))
     }
 
     #[inline]
@@ -194,12 +257,11 @@ fn size_for(camera: &Camera, settings: &RenderSettings) -> (u32, u32) {
 }
 
 fn medium_around<'a>(
-    camera: &FilmCamera,
+    ray: &Ray,
     geometry: &Geometry,
     material_of: impl Fn(u32) -> &'a PreparedMaterial,
 ) -> Medium {
-    let ray = camera.axis_ray();
-    let hit = geometry.bvh.closest_where(&ray, |hit| material_of(hit.triangle).is_interface)?;
+    let hit = geometry.bvh.closest_where(ray, |hit| material_of(hit.triangle).is_interface)?;
     let is_behind = geometry.at(&hit).geometric_normal().is_some_and(|n| n.dot(ray.direction) > 0.0);
     material_of(hit.triangle).absorption.filter(|_| is_behind)
 }
@@ -245,6 +307,30 @@ fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), Rende
     }
 }
 
+/// How many light paths there are to be, or why none.
+fn light_paths(
+    settings: &RenderSettings,
+    camera: &FilmCamera,
+    filter: &FilterSampler,
+    lights: &Lights,
+    pixels: u32,
+) -> Result<LightPaths, String> {
+    let sums = u64::from(pixels) * u64::from(settings.effective_replicates());
+    let needed = [
+        (settings.light_paths != Use::Never, "the settings ask for none"),
+        (light_partner(settings) == Partner::Bsdf, "they are weighed against both other ways to find light"),
+        (settings.max_depth > 0, "no light is scattered"),
+        (lights.can_emit(), "no surface emits light, nor does the environment from few directions"),
+        (camera.can_see_points(), "the camera's rays are parallel"),
+        (filter.radius() > 0.0, "the filter is a point"),
+        (sums <= MOST_SUMS, "there are too many replicates for so many pixels"),
+    ];
+    match needed.into_iter().find(|(is_given, _)| !is_given) {
+        Some((_, why)) => Err(why.to_owned()),
+        None => Ok(LightPaths { per_sample: pixels.div_ceil(PIXELS_PER_PATH) }),
+    }
+}
+
 /// What else finds the light that is sampled.
 fn light_partner(settings: &RenderSettings) -> Partner {
     let weighs_both = settings.nee && settings.mis && settings.integrator == Integrator::Path;
@@ -280,5 +366,5 @@ fn collect_lights(
         };
         EnvironmentLight::new(e, image, partner, tables)
     });
-    Lights::new(&triangles, &punctual, environment, geometry.radius)
+    Lights::new(&triangles, &punctual, environment, geometry.sphere)
 }

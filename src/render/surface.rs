@@ -37,6 +37,8 @@ pub(super) struct Shading<'s> {
     pub(super) bsdf: &'s Bsdf,
     /// The viewer in the frame.
     pub(super) wo: V3<f32>,
+    /// The frame is not the one that others see the point in: it was turned to this viewer.
+    is_turned: bool,
 }
 
 impl<'a> Surface<'a> {
@@ -60,6 +62,18 @@ impl<'a> Surface<'a> {
         }
     }
 
+    /// The same place as it is seen from the unit direction `wo`.
+    #[inline]
+    pub(super) fn seen_from(&self, wo: Vec3) -> Self {
+        Self { wo, is_front: wo.dot(self.normal) >= 0.0, ..*self }
+    }
+
+    /// |cos| between a unit direction and the geometric normal.
+    #[inline]
+    pub(super) fn geometric_cosine(&self, w: Vec3) -> f32 {
+        w.dot(self.normal).abs()
+    }
+
     /// The radiance that leaves towards the viewer.
     #[inline]
     pub(super) fn emitted(&self, scene: &Prepared) -> Rgb {
@@ -72,35 +86,62 @@ impl<'a> Surface<'a> {
         self.material.unlit(&scene.scene, &self.at, self.is_front)
     }
 
-    /// Frame and BSDF; none where the surface scatters nothing towards the viewer.
-    ///
-    /// The shading normal is turned to the viewer's geometric side, except for interfaces, whose inside is a place of its own.
-    /// Where it still looks away from the viewer, at silhouettes of smooth meshes, one-sided materials are black, as in Aris;
-    /// others fall back to the geometric normal.
-    ///
-    /// A BSDF that varies is kept in `varying`.
+    /// Frame and BSDF; none where the surface scatters nothing towards the viewer. A BSDF that varies is kept in `varying`.
     #[inline]
     pub(super) fn shading<'s>(
         &'s self,
         scene: &Prepared,
         varying: &'s mut Option<Bsdf>,
     ) -> Option<Shading<'s>> {
+        let (frame, is_turned) = self.frame(scene)?;
+        let wo = frame.local_from_world(self.wo);
+        Some(Shading { frame, bsdf: self.material.bsdf(&scene.scene, &self.at, varying), wo, is_turned })
+    }
+
+    /// The shading frame, and whether it was turned to this viewer.
+    ///
+    /// The shading normal is turned to the viewer's geometric side, except for interfaces, whose inside is a place of its own.
+    /// Where it still looks away from the viewer, at silhouettes of smooth meshes, one-sided materials are black, as in Aris;
+    /// others fall back to the geometric normal.
+    #[inline]
+    fn frame(&self, scene: &Prepared) -> Option<(Frame, bool)> {
         let one_sided = self.material.sides == Sides::Front;
         let is_interface = self.material.is_interface;
         if one_sided && !self.is_front && !is_interface {
             return None;
         }
         let side = if self.is_front || is_interface { 1.0 } else { -1.0 };
-        let faces_viewer = |n: Vec3| (self.wo.dot(n) > 0.0) == (self.is_front || !is_interface);
-        let mut frame = self.frame_around(scene, self.at.shading_normal(self.normal) * side);
-        if !faces_viewer(frame.normal) {
-            if one_sided && !is_interface {
-                return None;
-            }
-            frame = Frame::from_normal(self.normal * side);
+        let frame = self.frame_around(scene, self.at.shading_normal(self.normal) * side);
+        if self.faces(frame.normal) {
+            return Some((frame, self.material.has_normal_map()));
         }
-        let wo = frame.local_from_world(self.wo);
-        Some(Shading { frame, bsdf: self.material.bsdf(&scene.scene, &self.at, varying), wo })
+        let is_black = one_sided && !is_interface;
+        (!is_black).then(|| (Frame::from_normal(self.normal * side), true))
+    }
+
+    /// The viewer sees the side that a shading normal says it sees.
+    #[inline]
+    fn faces(&self, normal: Vec3) -> bool {
+        (self.wo.dot(normal) > 0.0) == (self.is_front || !self.material.is_interface)
+    }
+
+    /// How this place, seen as `shading` says, is seen from the direction `w`: in the same frame, unless frames depend on the viewer. None
+    /// where it scatters nothing to there.
+    #[inline]
+    pub(super) fn shading_from<'s>(
+        &self,
+        scene: &Prepared,
+        shading: &Shading<'s>,
+        w: Vec3,
+    ) -> Option<Shading<'s>> {
+        let turned = self.seen_from(w);
+        let is_same_side = turned.is_front == self.is_front || self.material.is_interface;
+        let (frame, is_turned) =
+            match !shading.is_turned && is_same_side && turned.faces(shading.frame.normal) {
+                true => (shading.frame, false),
+                false => turned.frame(scene)?,
+            };
+        Some(Shading { frame, bsdf: shading.bsdf, wo: frame.local_from_world(w), is_turned })
     }
 
     /// The shading normal on the front, of two-sided materials on the viewer's side.
@@ -127,7 +168,7 @@ impl<'a> Surface<'a> {
     /// The place as lights see it.
     #[inline]
     pub(super) fn receiver(&self) -> Receiver {
-        let normal = self.departure.viewed_normal();
+        let normal = if self.is_front { self.normal } else { -self.normal };
         let sides = if self.material.transmits { Sides::Both } else { Sides::Front };
         Receiver { point: self.point, normal, sides }
     }

@@ -10,6 +10,8 @@ pub struct Techniques {
     pub lobes_by_albedo: bool,
     /// Paths that carry little end early; without it at the greatest depth.
     pub roulette: bool,
+    /// Paths start from lights too; without it from the camera alone.
+    pub light_paths: bool,
     /// Saves work: what is the same all over a material is worked out once; without it at each point.
     pub constants: bool,
     /// Saves work: where all surfaces are opaque, rays ask no material whether it is there.
@@ -24,6 +26,7 @@ impl Default for Techniques {
             sobol: true,
             lobes_by_albedo: true,
             roulette: true,
+            light_paths: true,
             constants: true,
             coverage: true,
             useful_light: true,

@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use glam::{DVec3, Vec3};
 
 use super::film::{Control, sample_pixel};
+use super::light_image::LightImage;
 use super::{Prepared, RenderError};
 use crate::color::Rgb;
 use crate::math::stats::relative_square;
@@ -105,19 +106,12 @@ impl Tile {
         u64::from(self.width) * u64::from(self.height)
     }
 
-    /// Takes all samples that the settings ask for.
-    pub(super) fn finish(&mut self, scene: &Prepared, control: &Control) -> Result<(), RenderError> {
-        for samples in levels(&scene.settings) {
-            self.sample_up_to(scene, samples, control)?;
-        }
-        Ok(())
-    }
-
     /// Goes on, unless it is finished, until each pixel has `samples` of them, and judges whether that is enough.
     pub(super) fn sample_up_to(
         &mut self,
         scene: &Prepared,
         samples: u32,
+        lit: &LightImage,
         control: &Control,
     ) -> Result<(), RenderError> {
         if self.is_finished {
@@ -135,12 +129,12 @@ impl Tile {
             control.paths.fetch_add(u64::from(samples - self.samples), Ordering::Relaxed);
         }
         self.samples = samples;
-        let is_good = |goal: f32| samples >= FEWEST_JUDGED && self.error() <= f64::from(goal);
+        let is_good = |goal: f32| samples >= FEWEST_JUDGED && self.error(lit) <= f64::from(goal);
         self.is_finished = samples == scene.settings.spp || scene.settings.error.is_some_and(is_good);
         if self.is_finished {
             let spared = u64::from(scene.settings.spp - samples) * self.area();
             control.paths.fetch_add(spared, Ordering::Relaxed);
-            self.settle();
+            self.settle(lit);
         }
         Ok(())
     }
@@ -184,33 +178,40 @@ impl Tile {
     }
 
     /// Nothing more is to be added: keeps what the sums come to, which is several times smaller.
-    fn settle(&mut self) {
+    fn settle(&mut self, lit: &LightImage) {
         if self.pixels.is_empty() {
-            self.pixels = self.so_far().collect();
+            self.pixels = self.so_far(lit).collect();
             (self.sums, self.replicates) = (Vec::new(), Vec::new());
         }
     }
 
-    fn so_far(&self) -> impl Iterator<Item = Pixel> {
+    fn so_far(&self, lit: &LightImage) -> impl Iterator<Item = Pixel> {
         let replicates = self.replicates.len() / self.sums.len().max(1);
-        self.sums.iter().zip(self.replicates.chunks(replicates.max(1))).map(|(sums, sets)| sums.pixel(sets))
+        let of_camera = self.sums.iter().zip(self.replicates.chunks(replicates.max(1)));
+        self.places().zip(of_camera).map(|((x, y), (sums, sets))| {
+            let mut sets = sets.to_vec();
+            for (set, light) in sets.iter_mut().zip(lit.pixel(x, y)) {
+                set.radiance += light * f64::from(set.count);
+            }
+            sums.pixel(&sets)
+        })
     }
 
     /// The finished pixels with their columns and rows in the picture.
-    pub(super) fn pixels(&mut self) -> impl Iterator<Item = ((u32, u32), Pixel)> {
-        self.settle();
+    pub(super) fn pixels(&mut self, lit: &LightImage) -> impl Iterator<Item = ((u32, u32), Pixel)> {
+        self.settle(lit);
         self.places().zip(self.pixels.iter().copied())
     }
 
     /// The error that is expected of the tile, as `bench` measures it: the mean over pixels and channels of the variance over the
     /// square plus 0.01. The few replicates of a single pixel tell little, those of all pixels together enough.
-    fn error(&self) -> f64 {
+    fn error(&self, lit: &LightImage) -> f64 {
         let of_pixel = |p: Pixel| {
             let (mean, variance) = (p.beauty.to_array(), p.variance.to_array());
             let of_channel = |(m, v): (f32, f32)| relative_square(f64::from(v), f64::from(m));
             mean.into_iter().zip(variance).map(of_channel).sum::<f64>() / 3.0
         };
-        self.so_far().map(of_pixel).sum::<f64>() / self.area() as f64
+        self.so_far(lit).map(of_pixel).sum::<f64>() / self.area() as f64
     }
 }
 

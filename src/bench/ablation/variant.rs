@@ -63,6 +63,11 @@ impl Variant {
                 Change::Without(|techniques| techniques.sobol = false),
             ),
             Self::new(
+                "no light paths",
+                "paths start from the camera alone",
+                Change::Without(|techniques| techniques.light_paths = false),
+            ),
+            Self::new(
                 "no roulette",
                 "paths go on to the greatest depth",
                 Change::Without(|techniques| techniques.roulette = false),

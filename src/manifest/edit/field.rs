@@ -150,6 +150,7 @@ fields! {
         Integrator "integrator": "one of \"path\", \"normals\", \"albedo\", \"diffuse_albedo\", \"depths\", \"ao\", \"whitted\", \"emitter_check\"",
         Nee "nee": "true or false",
         Mis "mis": "true or false",
+        LightPaths "light_paths": "one of \"auto\", \"always\", \"never\"",
     }
 }
 

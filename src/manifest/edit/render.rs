@@ -3,7 +3,7 @@
 use super::field::RenderField;
 use super::value::{self, Mismatch};
 use crate::record::Value;
-use crate::settings::{Filter, Integrator, RenderSettings};
+use crate::settings::{Filter, Integrator, RenderSettings, Use};
 
 /// The largest whole number up to which every one is an `f64`: 2^53.
 pub(super) const MAX_WHOLE: u64 = 1 << 53;
@@ -38,6 +38,7 @@ pub(super) fn set(settings: &mut RenderSettings, field: RenderField, value: &Val
         RenderField::Integrator => settings.integrator = value::choice(value, Integrator::from_name)?,
         RenderField::Nee => settings.nee = value::flag(value)?,
         RenderField::Mis => settings.mis = value::flag(value)?,
+        RenderField::LightPaths => settings.light_paths = value::choice(value, Use::from_name)?,
     }
     Ok(())
 }

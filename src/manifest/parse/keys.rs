@@ -68,6 +68,7 @@ pub(in crate::manifest) const HOMES: &[(&str, &[&str])] = &[
             "integrator",
             "nee",
             "mis",
+            "light_paths",
         ],
     ),
     ("[sheet]", &["columns", "rows", "cell_width"]),
