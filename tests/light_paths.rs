@@ -91,6 +91,33 @@ fn clear() -> Scene {
     scene(parts, camera)
 }
 
+/// A shiny sheet and a mirror whose smooth normals lean over, all the same way: light is reflected as if they stood at an angle.
+fn leaning() -> Scene {
+    let leaning = |center: Vec3, normal: Vec3, towards: Vec3| {
+        let mut mesh = facing(0.6, center, normal);
+        mesh.normals = vec![(normal + towards * 0.45).normalize(); mesh.positions.len()];
+        mesh
+    };
+    let mirror = Material { model: Model::Mirror, ..Material::default() };
+    let mut parts = walls();
+    parts.push((leaning(Vec3::new(-0.7, 0.5, 0.2), Vec3::Y, -Vec3::Z), metal(0.2)));
+    parts.push((leaning(Vec3::new(1.0, 0.3, 0.2), Vec3::Y, -Vec3::X), mirror));
+    parts.push(lamp());
+    scene(parts, camera())
+}
+
+/// The camera is under water, the lamp above it: light is bent once on its way.
+fn submerged() -> Scene {
+    let camera = Camera::look_at(Vec3::new(0.0, 0.9, 1.8), Vec3::ZERO, Vec3::Y, 0.7);
+    let mut parts = walls();
+    let absorption = Rgb::new(0.4, 0.1, 0.05);
+    let white = Param::Constant(Rgb::WHITE);
+    parts.push((square(2.5, 1.3), Material { base_color: white, absorption, ..glass(0.0) }));
+    parts.push((ball(0.3, Vec3::new(0.5, 0.3, 0.0)), lambert(0.7)));
+    parts.push((facing(0.8, Vec3::new(0.3, 2.2, 0.0), -Vec3::Y), emitting(lambert(0.0), 4.0)));
+    scene(parts, camera)
+}
+
 fn add_texture(world: &mut Scene, channels: u8, pixels: Vec<f32>) -> TextureMap {
     world.images.push(Arc::new(Image {
         name: "map".into(),
@@ -125,9 +152,13 @@ fn mapped() -> Scene {
     parts.push((facing(0.5, Vec3::new(0.5, 1.5, 0.2), Vec3::new(0.2, 1.0, 0.0)), leaf));
     parts.push((facing(0.5, Vec3::new(0.5, 0.9, 0.4), Vec3::new(0.1, 1.0, 0.0)), screen));
     parts.push((with_coordinates(lamp), shining));
+    let mirror = Material { model: Model::Mirror, ..Material::default() };
+    parts.push((with_coordinates(facing(0.6, Vec3::new(1.5, 0.6, 0.3), -Vec3::X)), mirror));
     let mut world = scene(parts, camera());
     let normals = add_texture(&mut world, 3, vec![0.85, 0.5, 0.75, 0.3, 0.2, 0.7, 0.5, 0.95, 0.6]);
-    world.materials[2].item.normal_map = Some(NormalMap { map: normals, scale: 1.0 });
+    for material in [2, 6] {
+        world.materials[material].item.normal_map = Some(NormalMap { map: normals.clone(), scale: 1.0 });
+    }
     let colors = add_texture(&mut world, 3, vec![1.0, 0.2, 0.1, 0.1, 0.6, 1.0]);
     world.materials[5].item.emission.color = Param::Texture { map: colors, factor: Rgb::grey(40.0) };
     world
@@ -200,6 +231,8 @@ fn with_and_without_light_paths_every_part_of_a_picture_has_the_same_mean() {
         ("clear", clear(), Filter::Tent),
         ("mapped", mapped(), Filter::BlackmanHarris),
         ("sunny", sunny(), Filter::Box),
+        ("leaning", leaning(), Filter::Box),
+        ("submerged", submerged(), Filter::Box),
     ] {
         let world = Arc::new(world);
         let with = RenderSettings { light_paths: Use::Always, filter, ..small(32, 24, 96, 5) };
