@@ -190,8 +190,7 @@ fn sunny() -> Scene {
 fn rendered(world: &Arc<Scene>, settings: &RenderSettings) -> Rendered {
     let geometry = Arc::new(Geometry::build(world).expect("geometry"));
     let prepared = Prepared::new(Arc::clone(world), geometry, settings).expect("prepared");
-    let uses = !prepared.skipped().iter().any(|line| line.starts_with("light paths"));
-    assert_eq!(uses, settings.light_paths != Use::Never);
+    assert_eq!(prepared.has_light_paths(), settings.light_paths != Use::Never);
     let rendered = render(&prepared, &Control::default()).expect("rendered");
     assert_eq!(rendered.counts.bad_samples, 0);
     rendered
@@ -218,8 +217,8 @@ fn pooled(world: &Arc<Scene>, settings: &RenderSettings, seeds: std::ops::Range<
     (0..runs[0].len())
         .map(|tile| {
             let mean = runs.iter().map(|run| run[tile]).sum::<f64>() / n;
-            let spread = runs.iter().map(|run| (run[tile] - mean).powi(2)).sum::<f64>() / (n - 1.0);
-            (mean, spread / n)
+            let squares = runs.iter().map(|run| (run[tile] - mean) * (run[tile] - mean));
+            (mean, squares.sum::<f64>() / (n - 1.0) / n)
         })
         .collect()
 }

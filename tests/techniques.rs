@@ -8,12 +8,13 @@ use pipeline::convert::ConvertOptions;
 use pipeline::import::ImportOptions;
 use pipeline::job::{LoadedScene, load};
 use pipeline::render::{Control, Prepared, Rendered, Techniques, render};
-use pipeline::settings::RenderSettings;
+use pipeline::settings::{RenderSettings, Use};
 
 const ALL: Techniques = Techniques {
     sobol: true,
     lobes_by_albedo: true,
     roulette: true,
+    light_paths: true,
     constants: true,
     coverage: true,
     useful_light: true,
@@ -28,7 +29,9 @@ fn scene(name: &str) -> LoadedScene {
 }
 
 fn prepared(scene: &LoadedScene, spp: u32) -> Prepared {
-    let settings = RenderSettings { width: Some(32), height: Some(24), spp, ..RenderSettings::default() };
+    let light_paths = Use::Always;
+    let size = RenderSettings { width: Some(32), height: Some(24), ..RenderSettings::default() };
+    let settings = RenderSettings { spp, light_paths, ..size };
     Prepared::new(Arc::clone(&scene.scene), Arc::clone(&scene.geometry), &settings).expect("prepared")
 }
 
@@ -84,6 +87,7 @@ fn what_is_left_out_is_not_done() {
     let rays = |techniques| rendered(&prepared(&all_sorts, 8).with(techniques)).counts.rays;
     assert!(rays(Techniques { useful_light: false, ..ALL }) > rays(ALL));
     assert!(rays(Techniques { roulette: false, ..ALL }) > rays(ALL));
+    assert!(rays(Techniques { light_paths: false, ..ALL }) < rays(ALL));
 }
 
 /// The mean of all values of the picture with the variance of that mean, which the data part tells.
@@ -108,6 +112,7 @@ fn without_what_lessens_noise_the_expectation_is_the_same() {
             Techniques { sobol: false, ..ALL },
             Techniques { lobes_by_albedo: false, ..ALL },
             Techniques { roulette: false, ..ALL },
+            Techniques { light_paths: false, ..ALL },
         ] {
             let without = rendered(&prepared(&scene, 256).with(techniques));
             // The box has no material of two lobes.

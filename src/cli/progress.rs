@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -27,6 +27,12 @@ pub(super) struct Progress {
     /// Jobs that were rendered.
     done: u64,
     follower: Option<Follower>,
+}
+
+/// How much of `whole` has passed, at most 1.
+fn share(passed: Duration, whole: Duration) -> f64 {
+    let share = passed.as_secs_f64() / whole.as_secs_f64();
+    if share < 1.0 { share } else { 1.0 }
 }
 
 struct Follower {
@@ -56,17 +62,21 @@ impl Progress {
         let stop = Arc::new(AtomicBool::new(false));
         let (bar, control, done, stopped) =
             (self.bar.clone(), Arc::clone(control), self.done, Arc::clone(&stop));
+        let start = Instant::now();
         let thread = std::thread::spawn(move || {
             while !stopped.load(Ordering::Relaxed) {
                 let (paths, total) =
                     (control.paths.load(Ordering::Relaxed), control.total_paths.load(Ordering::Relaxed));
                 if let Some(steps) = (paths.min(total) * STEPS).checked_div(total) {
+                    // What ends first: the samples or the time.
+                    let passed = control.time_limit.map_or(0.0, |limit| share(start.elapsed(), limit));
+                    let steps = steps.max((passed * STEPS as f64) as u64);
                     bar.set_position(done * STEPS + steps);
-                    bar.set_message(format!(
-                        "{:.1}/{:.1} M samples",
-                        paths as f64 * 1e-6,
-                        total as f64 * 1e-6
-                    ));
+                    let [paths, total] = [paths, total].map(|count| count as f64 * 1e-6);
+                    bar.set_message(match control.time_limit {
+                        None => format!("{paths:.1}/{total:.1} M samples"),
+                        Some(_) => format!("{paths:.1} M samples"),
+                    });
                 }
                 std::thread::park_timeout(INTERVAL);
             }

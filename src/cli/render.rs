@@ -326,7 +326,8 @@ fn tell_path(prepared: &Prepared, planned: &PlannedJob, x: u32, y: u32, sample: 
         text +=
             &format!("{:>3}  at ({px}, {py}, {pz})  beta {beta:?}  radiance so far {radiance:?}\n", i + 1);
     }
-    print(&format!("{text}radiance {:?}\n", path.radiance.to_array()))?;
+    let part = if prepared.has_light_paths() { ", without what light paths bring" } else { "" };
+    print(&format!("{text}radiance {:?}{part}\n", path.radiance.to_array()))?;
     Ok(WELL)
 }
 

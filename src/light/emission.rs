@@ -106,8 +106,8 @@ impl Lights {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{numbers, quad_lights};
     use super::*;
+    use crate::light::tests::{numbers, quad_lights};
     use crate::light::{EnvironmentLight, EnvironmentTables, Partner};
     use crate::scene::environment::Environment;
 

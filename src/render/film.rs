@@ -59,7 +59,8 @@ pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderErr
     for samples in levels(&scene.settings).filter(|&n| may_end_early || n == scene.settings.spp) {
         // Every tile gets its first samples, also after the deadline: a picture has no holes.
         let is_late = || deadline.is_some_and(|deadline| Instant::now() >= deadline);
-        if samples > scene.settings.effective_replicates() && is_late() {
+        let is_enough = tiles.iter().all(|tile| tile.is_finished);
+        if is_enough || (tiles.iter().all(|tile| tile.samples > 0) && is_late()) {
             break;
         }
         lit.sample_up_to(scene, samples, control)?;

@@ -147,6 +147,11 @@ impl Prepared {
         self
     }
 
+    /// Paths start from lights too: those of the camera are but a part of the picture.
+    pub fn has_light_paths(&self) -> bool {
+        self.light_paths.is_ok()
+    }
+
     /// Columns and rows of the image.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)

@@ -59,7 +59,7 @@ pub(super) struct Tile {
     /// Samples a pixel so far.
     pub(super) samples: u32,
     /// The settings ask for no more.
-    is_finished: bool,
+    pub(super) is_finished: bool,
     pub(super) rays: u64,
     pub(super) bad_count: u64,
     /// The first of them.
