@@ -111,11 +111,11 @@ impl FilmCamera {
 
     /// How `point` is seen through the place of the lens that `u_lens` chooses as [`Self::ray`] does; none behind the camera and where
     /// rays are parallel.
-    pub(super) fn see(&self, point: Vec3, u_lens: [f32; 2]) -> Option<Sight> {
+    pub(super) fn see(&self, point: Vec3, u_lens: impl FnOnce() -> [f32; 2]) -> Option<Sight> {
         if !self.is_perspective {
             return None;
         }
-        let on_lens = self.lens.as_ref().map_or(Vec3::ZERO, |lens| lens_point(lens, u_lens));
+        let on_lens = self.lens.as_ref().map_or(Vec3::ZERO, |lens| lens_point(lens, u_lens()));
         let origin = self.world_from_camera.transform_point3(on_lens);
         let to_point = point - origin;
         let distance = to_point.length();
@@ -211,11 +211,11 @@ mod tests {
         for camera in [skewed(false), skewed(true)] {
             for (film, u) in [(Vec2::new(10.0, 7.5), [0.1, 0.9]), (Vec2::new(60.0, 40.0), [0.8, 0.3])] {
                 let ray = camera.ray(film, u);
-                let sight = camera.see(ray.origin + ray.direction * 5.0, u).unwrap();
+                let sight = camera.see(ray.origin + ray.direction * 5.0, || u).unwrap();
                 assert!((sight.film - film).length() < 1e-3, "{} {film}", sight.film);
                 assert!((sight.direction - ray.direction).length() < 1e-5);
                 assert!((sight.distance - 5.0).abs() < 1e-4);
-                assert!(camera.see(ray.origin - ray.direction, u).is_none());
+                assert!(camera.see(ray.origin - ray.direction, || u).is_none());
             }
         }
     }
