@@ -5,11 +5,9 @@
 //! binary and of its eight-wide tree, with its triangle test, which is not watertight. Figures are millions of rays a second, the medians
 //! of rounds in which all take turns, and the ratio of ours to the faster of the others.
 
-use std::hint::black_box;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
+use std::time::Duration;
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -22,21 +20,17 @@ use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use pipeline::accel::{Bvh, Ray};
 use pipeline::bench::rays::{RaySet, ray_sets};
-use pipeline::convert::ConvertOptions;
-use pipeline::import::ImportOptions;
-use pipeline::job::load;
-use pipeline::render::Prepared;
-use pipeline::scene::Camera;
-use pipeline::settings::RenderSettings;
 
-const ROUNDS: usize = 7;
-const SIZE: (u32, u32) = (640, 480);
+#[path = "common/mod.rs"]
+mod common;
+
+use common::{ROUNDS, middle, prepared, timed};
 
 fn main() {
     let mut out = std::io::stdout().lock();
     let mut line = |text: String| writeln!(out, "{text}").expect("stdout");
     for path in files() {
-        let prepared = prepared(&path);
+        let prepared = prepared(&path).expect("a scene that can be rendered");
         let contest = Contest::new(&prepared.geometry().corners());
         line(format!("{}: {}", path.file_name().unwrap_or_default().display(), contest.report));
         line(format!(
@@ -68,19 +62,6 @@ fn files() -> Vec<PathBuf> {
         files.extend(["kitchen.obj.zst", "stanford-bunny.obj.zst"].map(|name| obj.join(name)));
     }
     files
-}
-
-/// Ready to be rendered with its own or a fitting view; the kitchen is looked at from inside.
-fn prepared(path: &Path) -> Prepared {
-    let loaded = load(path, &ImportOptions::default(), &ConvertOptions::default(), None).expect("a scene");
-    let mut scene = (*loaded.scene).clone();
-    if let Some((low, high)) = scene.bounds().filter(|_| path.ends_with("kitchen.obj.zst")) {
-        let eye = low + (high - low) * Vec3::new(0.7, 0.55, 0.8);
-        scene.cameras[0].item = Camera::look_at(eye, low.midpoint(high), Vec3::Y, 0.9);
-    }
-    let (width, height) = SIZE;
-    let settings = RenderSettings { width: Some(width), height: Some(height), ..RenderSettings::default() };
-    Prepared::new(Arc::new(scene), loaded.geometry, &settings).expect("a scene that can be rendered")
 }
 
 /// A tree of ours and two of obvhs', over the same triangles.
@@ -171,17 +152,4 @@ fn race(
         times[2].push(timed(|| rays.iter().filter(|ray| cwbvh(ray)).count()));
     }
     times.map(|times| rays.len() as f64 * 1e-6 / middle(times).0)
-}
-
-/// What `work` gives, and the seconds it takes.
-fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
-    let start = Instant::now();
-    let result = black_box(work());
-    (start.elapsed().as_secs_f64(), result)
-}
-
-/// The run of median time.
-fn middle<T>(mut runs: Vec<(f64, T)>) -> (f64, T) {
-    runs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    runs.swap_remove(ROUNDS / 2)
 }

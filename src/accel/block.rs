@@ -80,12 +80,14 @@ impl Block {
 
         let scale = lanes.splat(ray.inverse[2]);
         let inverse = lanes.splat(1.0) / (u + v + w);
-        let t = (u * (scale * az) + v * (scale * bz) + w * (scale * cz)) * inverse;
+        let (along_a, along_b, along_c) = (scale * az, scale * bz, scale * cz);
+        let t = (u * along_a + v * along_b + w * along_c) * inverse;
         let (x, y, z) = (largest(ax, bx, cx), largest(ay, by, cy), largest(az, bz, cz));
         let uncertain =
             t.abs().less(lanes.splat(UNCERTAIN) * (x * y + z * (x + y)) * (z * scale * inverse).abs());
         let in_front = zero.less(t);
-        let t = self.entry(lanes, ray, 2).max(t);
+        // Rounding is monotonic: the least of them is the entry across the last axis.
+        let t = along_a.min(along_b).min(along_c).max(t);
         let t = self.entry(lanes, ray, 0).max(self.entry(lanes, ray, 1).max(t));
         let doubtful = on_edge | (inside & uncertain);
         let mut candidates = doubtful | (inside & in_front & t.at_most(lanes.splat(t_max)));
@@ -114,13 +116,15 @@ impl Block {
         ControlFlow::Continue(())
     }
 
-    /// Where the ray enters the slabs around the triangles across one of the sheared axes; NaN where it runs in a face.
+    /// Where the ray enters the slabs around the triangles across one of the two sheared axes; NaN where it runs in a face.
     #[inline(always)]
     fn entry<L: Lanes>(&self, lanes: L, ray: &ShearedRay, i: usize) -> L::Floats {
         let axis = ray.axes[i];
         let (a, b) = (lanes.load(&self.vertices[0][axis]), lanes.load(&self.vertices[1][axis]));
         let c = lanes.load(&self.vertices[2][axis]);
-        let near = if ray.inverse[i] < 0.0 { a.max(b).max(c) } else { a.min(b).min(c) };
+        // The least or, running backward, the greatest: without a branch, as scattered rays have no favourite.
+        let sign = lanes.splat(1.0_f32.copysign(ray.inverse[i]));
+        let near = sign * (sign * a).min(sign * b).min(sign * c);
         (near - lanes.splat(ray.origin[i])) * lanes.splat(ray.inverse[i])
     }
 }
