@@ -16,7 +16,7 @@ pub(super) struct Places {
 impl Places {
     /// The places of `triangles`.
     pub(super) fn new(triangles: &[[Vec3; 3]]) -> Self {
-        let mut hashes: Vec<(u64, u32)> = triangles.iter().map(hash_of).zip(0..).collect();
+        let mut hashes = suspects(triangles);
         hashes.sort_unstable();
         let corners = |t: u32| sorted_bits(&triangles[t as usize]);
         let mut others = Vec::new();
@@ -55,6 +55,27 @@ impl Places {
         let rest = &self.others[from..];
         &rest[..rest.partition_point(|&(f, _)| f == first)]
     }
+}
+
+/// The triangles that may share a place, with their hashes: few where none do, and those are soon sorted.
+fn suspects(triangles: &[[Vec3; 3]]) -> Vec<(u64, u32)> {
+    let hashes: Vec<u64> = triangles.iter().map(hash_of).collect();
+    // A bit for each end of a hash, sixteen times as many as there are triangles.
+    let bits = (hashes.len() * 16).next_power_of_two().max(64);
+    let place = |hash: u64| {
+        let bit = hash as usize & (bits - 1);
+        (bit / 64, 1 << (bit % 64))
+    };
+    let (mut once, mut again) = (vec![0u64; bits / 64], vec![0u64; bits / 64]);
+    for (word, bit) in hashes.iter().map(|&hash| place(hash)) {
+        again[word] |= once[word] & bit;
+        once[word] |= bit;
+    }
+    let is_suspect = |&(hash, _): &(u64, u32)| {
+        let (word, bit) = place(hash);
+        again[word] & bit != 0
+    };
+    hashes.into_iter().zip(0..).filter(is_suspect).collect()
 }
 
 /// The bits of a corner; -0 is 0.
