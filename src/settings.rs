@@ -5,7 +5,9 @@ mod loading;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use loading::{ClearcoatScale, ConvertOptions, ImportOptions, LightUnits, PhongRoughness, Reach};
+pub use loading::{
+    ClearcoatScale, ConvertOptions, DecodedImages, ImportOptions, LightUnits, PhongRoughness, Reach,
+};
 
 /// Everything about a render that can change a bit of its result and is not in the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

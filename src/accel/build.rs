@@ -9,6 +9,7 @@ use obvhs::bvh2::builder::build_bvh2;
 
 use super::block::Block;
 use super::collapse::Plan;
+use super::places::Places;
 use super::traverse::MOST_LEVELS;
 use super::{Bvh, Child, Kernel, Node};
 
@@ -29,7 +30,7 @@ pub enum BuildError {
     },
 }
 
-/// The binary tree's quality, with one triangle a leaf: which of them share a block is for the plan to say. A longer search, and
+/// The binary tree's quality, with one place a leaf: which of them share a block is for the plan to say. A longer search, and
 /// a second round of moving nodes to better places, would make the build half again as long and rays no faster.
 fn parameters() -> BvhBuildParams {
     BvhBuildParams {
@@ -53,19 +54,21 @@ impl Bvh {
         let root = if triangles.is_empty() {
             layout.block(&[])
         } else {
-            let mut tree = build_bvh2(&boxes(triangles), parameters(), &mut Duration::default());
+            let places = Places::new(triangles);
+            let mut tree = build_bvh2(&boxes(triangles, &places), parameters(), &mut Duration::default());
             // Parents before their children, and near them in memory; who is whose parent needn't be known any more.
             tree.parents.clear();
             tree.reorder_in_stack_traversal_order();
-            layout.subtree(&Plan::new(&tree, triangles), 0, 0)
+            layout.subtree(&Plan::new(&tree, triangles, &places), 0, 0)
         };
         let Layout { nodes, blocks, .. } = layout;
         Ok(Self { root, nodes, blocks, len: triangles.len(), kernel: Kernel::detect() })
     }
 }
 
-fn boxes(triangles: &[[Vec3; 3]]) -> Vec<Aabb> {
-    triangles.iter().map(|t| Aabb::from_points(&t.map(Vec3A::from))).collect()
+fn boxes(triangles: &[[Vec3; 3]], places: &Places) -> Vec<Aabb> {
+    let of_first = |&t: &u32| Aabb::from_points(&triangles[t as usize].map(Vec3A::from));
+    places.firsts().iter().map(of_first).collect()
 }
 
 /// The wide tree as it grows.
@@ -79,9 +82,10 @@ impl Layout<'_> {
     /// Adds what the plan makes of a binary node that has `level` wide ones above it.
     fn subtree(&mut self, plan: &Plan<'_>, n: u32, level: usize) -> Child {
         if let Some(triangles) = plan.leaf(n) {
-            return self.block(&triangles);
+            // Of one place there may be more than a block holds.
+            return self.balanced(&triangles);
         }
-        // Thousands of boxes one in another, or in one place, make a tree thousands of levels deep.
+        // Thousands of boxes one in another, or in nearly one place, make a tree thousands of levels deep.
         if level == MOST_LEVELS - BALANCED_LEVELS {
             return self.balanced(&plan.triangles(n));
         }

@@ -6,6 +6,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
 use super::block::Block;
+use super::places::Places;
 
 /// What a wide node and a block of triangles cost, whatever they hold: both are tested at once.
 const NODE_COST: f32 = 1.0;
@@ -14,6 +15,8 @@ const BLOCK_COST: f32 = 1.0;
 /// The cheapest ways to cut a binary tree into wide nodes.
 pub(super) struct Plan<'a> {
     tree: &'a Bvh2,
+    /// What its leaves hold.
+    places: &'a Places,
     /// The half area of the root's box.
     whole: f64,
     /// What is under each node.
@@ -27,27 +30,34 @@ struct Part {
     costs: [f32; 7],
     /// How many triangles those are.
     count: u32,
-    /// Their area.
+    /// The area of their places.
     area: f32,
 }
 
 impl<'a> Plan<'a> {
-    /// Plans for a `tree` with one triangle a leaf and parents before their children.
-    pub(super) fn new(tree: &'a Bvh2, triangles: &[[Vec3; 3]]) -> Self {
+    /// Plans for a `tree` with one of the `places` a leaf and parents before their children.
+    pub(super) fn new(tree: &'a Bvh2, triangles: &[[Vec3; 3]], places: &'a Places) -> Self {
+        let area = |&t: &u32| {
+            let [a, b, c] = triangles[t as usize];
+            (b - a).cross(c - a).length()
+        };
         // In the order of memory.
-        let areas: Vec<f32> = triangles.iter().map(|&[a, b, c]| (b - a).cross(c - a).length()).collect();
+        let areas: Vec<f32> = places.firsts().iter().map(area).collect();
         let mut plan = Self {
             tree,
+            places,
             whole: half_area(&tree.nodes[0].aabb).max(f64::MIN_POSITIVE),
             parts: vec![Part::default(); tree.nodes.len()],
         };
         for n in (0..tree.nodes.len() as u32).rev() {
             plan.parts[n as usize] = match plan.children(n) {
-                None => Part {
-                    costs: [BLOCK_COST * plan.probability(n); 7],
-                    count: 1,
-                    area: areas[plan.triangle(n) as usize],
-                },
+                None => {
+                    let place = plan.place(n);
+                    let count = places.count(place);
+                    let blocks = count.div_ceil(Block::ROOM as u32) as f32;
+                    let costs = [BLOCK_COST * blocks * plan.probability(n); 7];
+                    Part { costs, count, area: areas[place as usize] }
+                }
                 Some(children) => plan.joined(n, children.map(|c| plan.parts[c as usize])),
             };
         }
@@ -70,11 +80,12 @@ impl<'a> Plan<'a> {
         Part { costs, count, area: left.area + right.area }
     }
 
-    /// A node's triangles, if it is to be a leaf.
+    /// A node's triangles, if it is to be a leaf: those of one place, or as many as a block holds.
     pub(super) fn leaf(&self, n: u32) -> Option<Vec<u32>> {
         let part = &self.parts[n as usize];
-        let is_leaf = part.count as usize <= Block::ROOM && BLOCK_COST * self.probability(n) <= part.costs[0];
-        is_leaf.then(|| self.triangles(n))
+        let is_block =
+            part.count as usize <= Block::ROOM && BLOCK_COST * self.probability(n) <= part.costs[0];
+        (is_block || self.children(n).is_none()).then(|| self.triangles(n))
     }
 
     /// The binary nodes that become an inner node's two to eight children: those first that are the most likely to stop a ray
@@ -102,7 +113,7 @@ impl<'a> Plan<'a> {
         let mut pending = vec![n];
         while let Some(n) = pending.pop() {
             match self.children(n) {
-                None => found.push(self.triangle(n)),
+                None => found.extend(self.places.triangles(self.place(n))),
                 Some([l, r]) => pending.extend([r, l]),
             }
         }
@@ -139,7 +150,7 @@ impl<'a> Plan<'a> {
         (node.prim_count == 0).then_some([node.first_index, node.first_index + 1])
     }
 
-    fn triangle(&self, leaf: u32) -> u32 {
+    fn place(&self, leaf: u32) -> u32 {
         self.tree.primitive_indices[self.tree.nodes[leaf as usize].first_index as usize]
     }
 }

@@ -11,6 +11,7 @@ mod block;
 mod build;
 mod collapse;
 mod lanes;
+mod places;
 #[cfg(test)]
 mod tests;
 mod traverse;

@@ -136,14 +136,45 @@ fn an_empty_tree_and_degenerate_triangles_are_never_hit() {
 #[test]
 fn thousands_of_coincident_triangles_build_and_are_all_visited() {
     let triangles =
-        vec![[Vec3::new(-1.0, -1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.0, 1.0, 1.0)]; 5000];
+        vec![[Vec3::new(-1.0, -1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.0, 1.0, 1.0)]; 20_000];
     let bvh = Bvh::build(&triangles).unwrap();
-    let mut seen = 0;
-    bvh.visit(&Ray::new(Vec3::ZERO, Vec3::Z), |_| {
-        seen += 1;
+    let mut seen = Vec::new();
+    bvh.visit(&Ray::new(Vec3::ZERO, Vec3::Z), |hit| {
+        seen.push(hit.triangle);
         ControlFlow::Continue(())
     });
-    assert_eq!(seen, 5000);
+    seen.sort_unstable();
+    assert!(seen.into_iter().eq(0..20_000));
+}
+
+/// Stacks of one triangle to two dozen, their corners turned round, mixed with what stands alone.
+#[test]
+fn stacks_hit_as_each_of_their_triangles_would_alone() {
+    let single = soup(60, 0.8);
+    let turned = |[a, b, c]: [Vec3; 3], i: usize| [[a, b, c], [b, c, a], [c, b, a]][i % 3];
+    let triangles: Vec<_> =
+        (0..1440).filter(|i| i / 60 <= i % 60).map(|i| turned(single[i % 60], i / 60)).collect();
+    let bvh = Bvh::build(&triangles).unwrap();
+    let mut stacked = 0;
+    for i in 0..4000 {
+        let k = (random(i, 4) * triangles.len() as f32) as usize;
+        let origin = Vec3::new(random(i, 1), random(i, 2), random(i, 3)) * 4.0 - 2.0;
+        let source = i.is_multiple_of(3).then_some(k as u32);
+        let target = triangles[k].iter().sum::<Vec3>() / 3.0 + direction(i) * 0.1;
+        let ray = Ray { source, ..Ray::new(origin, target - origin) };
+        let sheared = triangle::ShearedRay::new(&ray);
+        let alone = |&id: &u32| {
+            let hit = triangle::intersect(triangles[id as usize], &sheared);
+            ray.source != Some(id) && hit.is_some_and(|(t, _)| t < ray.t_max)
+        };
+        let expected: Vec<u32> = (0..triangles.len() as u32).filter(alone).collect();
+        let mut found: Vec<u32> = all_hits(&bvh, &ray).into_iter().map(|[id, ..]| id).collect();
+        found.sort_unstable();
+        assert_eq!(found, expected, "ray {i}");
+        assert_eq!(bvh.closest(&ray), brute_force(&triangles, &ray), "ray {i}");
+        stacked += usize::from(expected.len() > 9);
+    }
+    assert!(stacked > 300, "the test must hit stacks: {stacked}");
 }
 
 /// Meshes in which something is extreme: sizes, places, shapes, or how many are in one place.

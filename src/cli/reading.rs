@@ -33,6 +33,7 @@ impl Reading {
             time: self.time,
             animation: self.animation.clone(),
             reach: self.allowed.reach(),
+            ..ImportOptions::default()
         }
     }
 }

@@ -23,7 +23,7 @@ pub use images::{EnvironmentError, Images, read_environment, read_image};
 pub use obj::ObjError;
 pub use validate::InvalidScene;
 
-pub use crate::settings::{ImportOptions, LightUnits, Reach};
+pub use crate::settings::{DecodedImages, ImportOptions, LightUnits, Reach};
 
 use crate::record::Warning;
 use crate::scene::Scene;

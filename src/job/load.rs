@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use super::JobError;
 use crate::convert::{ConvertOptions, Note, to_disney};
-use crate::import::{ArisConfig, ArisRun, FileDigest, ImportOptions, Imported, import, import_configured};
+use crate::import::{
+    ArisConfig, ArisRun, DecodedImages, FileDigest, ImportOptions, Imported, import, import_configured,
+};
 use crate::library::Library;
 use crate::light::EnvironmentTables;
 use crate::record::Warning;
@@ -44,6 +46,7 @@ pub fn load(
     convert_options: &ConvertOptions,
     materials: Option<&Path>,
 ) -> Result<LoadedScene, JobError> {
+    let import_options = &ImportOptions { images: DecodedImages::OfInstances, ..import_options.clone() };
     let imported = import(path, import_options)?;
     let place = path.display().to_string();
     let options = (import_options, convert_options);

@@ -166,6 +166,11 @@ impl PreparedMaterial {
         self.normal_map.is_some()
     }
 
+    /// Its shading frame follows the surface's tangents.
+    pub(super) fn needs_tangents(&self) -> bool {
+        self.has_normal_map() || matches!(self.tangent, Tangent::Surface { .. })
+    }
+
     /// All of it is there.
     pub(super) fn covers_all(&self) -> bool {
         matches!(self.opacity, Covering::Opaque)

@@ -19,6 +19,7 @@ mod pilot;
 mod prepare;
 mod probe;
 mod range;
+mod skipped;
 mod surface;
 mod techniques;
 mod tile;

@@ -1,4 +1,4 @@
-//! What a job needs beyond geometry: materials, lights, camera, and what the scene lets us skip.
+//! What a job needs beyond geometry: materials, lights and camera.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ const DEFAULT_SIZE: (u32, u32) = (640, 480);
 pub struct Prepared {
     pub(super) scene: Arc<Scene>,
     pub(super) geometry: Arc<Geometry>,
-    materials: Vec<PreparedMaterial>,
+    pub(super) materials: Vec<PreparedMaterial>,
     /// The material of each instance.
     material_of: Vec<MaterialId>,
     pub(super) lights: Lights,
@@ -155,36 +155,6 @@ impl Prepared {
     /// Columns and rows of the image.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
-    }
-
-    /// What this scene lets the renderer leave out, in words.
-    pub fn skipped(&self) -> Vec<String> {
-        let [areas, punctual, environments] = self.lights.counts();
-        let constant = self.materials.iter().filter(|m| m.is_constant()).count();
-        let mut skipped = Vec::new();
-        if constant > 0 {
-            skipped.push(format!(
-                "parameters worked out once for {constant} of {} materials",
-                self.materials.len()
-            ));
-        }
-        if self.all_covered {
-            skipped.push("opacity: every surface is opaque".to_owned());
-        }
-        if !self.scene.materials.iter().any(|m| m.item.transmits()) {
-            skipped.push("transmission: nothing lets light through".to_owned());
-        }
-        if let Err(why) = &self.light_paths {
-            skipped.push(format!("light paths: {why}"));
-        }
-        for (count, what) in
-            [(areas, "area lights"), (punctual, "punctual lights"), (environments, "environment")]
-        {
-            if count == 0 {
-                skipped.push(format!("{what}: none"));
-            }
-        }
-        skipped
     }
 
     /// The position is within the filter of a pixel of the picture.

@@ -76,6 +76,10 @@ fn write_scene<M>(
             Pixels::U8(_) => "8 bits",
             Pixels::U16(_) => "16 bits",
             Pixels::F32(_) => "floats",
+            Pixels::Undecoded => {
+                writeln!(out, "  {i} {:?}: not decoded", image.name)?;
+                continue;
+            }
         };
         let (w, h, channels) = (image.width, image.height, image.channels);
         writeln!(out, "  {i} {:?}: {w} x {h}, channels: {channels} of {depth}", image.name)?;

@@ -15,7 +15,7 @@ pub struct Image {
     pub height: u32,
     /// Interleaved channels a pixel: 1 (grey), 2 (grey, alpha), 3 or 4.
     pub channels: u8,
-    /// The values, width · height · channels of them.
+    /// The values, width · height · channels of them, if it was decoded.
     pub pixels: Pixels,
 }
 
@@ -26,7 +26,18 @@ impl Image {
             Pixels::U8(values) => size_of_val(values.as_slice()) as u64,
             Pixels::U16(values) => size_of_val(values.as_slice()) as u64,
             Pixels::F32(values) => size_of_val(values.as_slice()) as u64,
+            Pixels::Undecoded => 0,
         }
+    }
+
+    /// The image called `name` that nothing samples; its size stays unknown.
+    pub fn undecoded(name: String) -> Self {
+        Self { name, width: 1, height: 1, channels: 1, pixels: Pixels::Undecoded }
+    }
+
+    /// Whether its pixels are there.
+    pub fn is_decoded(&self) -> bool {
+        self.pixels != Pixels::Undecoded
     }
 }
 
@@ -39,6 +50,8 @@ pub enum Pixels {
     U16(Vec<u16>),
     /// Floats, finite.
     F32(Vec<f32>),
+    /// None: nothing that is seen samples the image, so it was not decoded. It reads as white.
+    Undecoded,
 }
 
 /// An image with its encoding and sampler.
@@ -107,6 +120,7 @@ impl Image {
             Pixels::U8(v) => f32::from(v[at]) * (1.0 / 255.0),
             Pixels::U16(v) => f32::from(v[at]) * (1.0 / 65535.0),
             Pixels::F32(v) => v[at],
+            Pixels::Undecoded => 1.0,
         }
     }
 
@@ -118,7 +132,7 @@ impl Image {
             Encoding::Linear => self.stored(i, c),
             Encoding::Srgb => match &self.pixels {
                 Pixels::U8(v) => srgb_table()[usize::from(v[i * usize::from(self.channels) + c])],
-                Pixels::U16(_) | Pixels::F32(_) => linear_from_srgb(self.stored(i, c)),
+                Pixels::U16(_) | Pixels::F32(_) | Pixels::Undecoded => linear_from_srgb(self.stored(i, c)),
             },
         };
         match self.channels {

@@ -22,6 +22,19 @@ pub struct ImportOptions {
     /// How far the names of files in the scene lead. No part of a job's identity: what was read is.
     #[serde(skip)]
     pub reach: Reach,
+    /// Which images are decoded. No part of a job's identity either: no picture depends on it.
+    #[serde(skip)]
+    pub images: DecodedImages,
+}
+
+/// Which of a scene's images are decoded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DecodedImages {
+    /// Those of all materials: what writes materials needs them, whoever wears them.
+    #[default]
+    OfMaterials,
+    /// Those of materials that an instance may wear: no ray meets the others. Their files aren't even read.
+    OfInstances,
 }
 
 /// The unit of glTF's punctual lights.

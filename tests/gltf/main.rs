@@ -11,6 +11,7 @@ mod hostile;
 #[path = "../common/outside.rs"]
 mod outside;
 mod sample;
+mod undecoded;
 
 use std::path::Path;
 

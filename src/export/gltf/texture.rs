@@ -245,6 +245,8 @@ impl Textures {
                 Pixels::U8(values) => Interleaved::U8(values),
                 Pixels::U16(values) => Interleaved::U16(values),
                 Pixels::F32(values) => Interleaved::F32(values),
+                // Which the encoder refuses: an import for writing decodes all.
+                Pixels::Undecoded => Interleaved::U8(&[]),
             };
             let file = encode_texture(image.width, image.height, image.channels, pixels)?;
             let view = buffer.image(&file)?;

@@ -43,7 +43,7 @@ use self::geometry::{Geometry, Part, VertexAlpha};
 use self::nodes::Placed;
 use self::texture::Textures;
 use self::variants::Variant;
-use crate::import::{Files, ImportOptions};
+use crate::import::{DecodedImages, Files, ImportOptions};
 use crate::record::Warning;
 use crate::scene::source::{AlphaMode, GltfMaterial, SourceMaterial};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Named, Scene};
@@ -76,8 +76,14 @@ pub(super) fn import(
 
     let mut scene = Scene::empty();
     let mut textures = Textures::new(root, &buffers, files);
-    let materials = read_materials(root, variant, &mut textures)?;
+    let shown = match options.images {
+        DecodedImages::OfMaterials => (0..root.materials.len()).collect(),
+        DecodedImages::OfInstances => shown_materials(root, variant, &placed)?,
+    };
+    let mut materials = read_materials(root, variant, &mut textures, |index| shown.contains(&index))?;
     let surroundings = image_based::read(root, &mut textures)?;
+    textures.decode_no_more();
+    materials.extend(read_materials(root, variant, &mut textures, |index| !shown.contains(&index))?);
     let replaced;
     (scene.textures, scene.images, replaced) = textures.finish();
     warnings.extend(replaced);
@@ -101,7 +107,7 @@ pub(super) fn import(
         geometry,
         variant,
         meshes: BTreeMap::new(),
-        materials,
+        materials: materials.into_values().collect(),
         default_material: None,
         scene,
         warnings,
@@ -126,12 +132,23 @@ fn unread_extensions(root: &Root, file: &str) -> Vec<Warning> {
         .collect()
 }
 
-/// All materials of the file, named by index where they have no name.
+/// The materials of meshes that visible nodes carry.
+fn shown_materials(root: &Root, variant: Variant, placed: &[Placed]) -> Result<BTreeSet<usize>, GltfError> {
+    let meshes = placed.iter().filter(|p| p.visible).filter_map(|p| root.meshes.get(p.node.mesh?.value()));
+    let mut shown = BTreeSet::new();
+    for primitive in meshes.flat_map(|mesh| &mesh.primitives) {
+        shown.extend(variant.material(primitive)?);
+    }
+    Ok(shown)
+}
+
+/// The materials of the file that are `wanted`, by index, and named by it where they have no name.
 fn read_materials(
     root: &Root,
     variant: Variant,
     textures: &mut Textures,
-) -> Result<Vec<Named<GltfMaterial>>, GltfError> {
+    wanted: impl Fn(usize) -> bool,
+) -> Result<BTreeMap<usize, Named<GltfMaterial>>, GltfError> {
     let mut colored = BTreeSet::new();
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
     for primitive in primitives.filter(|p| geometry::attribute(p, Semantic::Colors(0)).is_some()) {
@@ -140,9 +157,9 @@ fn read_materials(
     let read = |(index, json): (usize, &gltf::json::Material)| {
         let name = json.name.clone().unwrap_or_else(|| format!("material_{index}"));
         let material = material::read(json, &name, index, colored.contains(&index), textures)?;
-        Ok(Named::new(name, material))
+        Ok((index, Named::new(name, material)))
     };
-    root.materials.iter().enumerate().map(read).collect()
+    root.materials.iter().enumerate().filter(|(index, _)| wanted(*index)).map(read).collect()
 }
 
 /// The meshes and materials of a mesh's primitives.

@@ -65,6 +65,8 @@ pub(super) struct Textures<'a> {
     by_view: BTreeMap<usize, ImageId>,
     by_use: BTreeMap<(usize, bool), TextureId>,
     decoder: Images,
+    /// Whether what is asked for is sampled.
+    decodes: bool,
     warnings: Vec<Warning>,
 }
 
@@ -82,6 +84,7 @@ impl<'a> Textures<'a> {
             by_view: BTreeMap::new(),
             by_use: BTreeMap::new(),
             decoder: Images::default(),
+            decodes: true,
             warnings: Vec::new(),
         }
     }
@@ -89,6 +92,11 @@ impl<'a> Textures<'a> {
     /// What was made, and what was noticed.
     pub(super) fn finish(self) -> (Vec<Texture>, Vec<Arc<Image>>, Vec<Warning>) {
         (self.textures, self.images, self.warnings)
+    }
+
+    /// From here on textures are for what nothing samples: images that aren't decoded yet stay so.
+    pub(super) fn decode_no_more(&mut self) {
+        self.decodes = false;
     }
 
     /// The texture of `slot`, whose values mean `encoding`, as `element` uses it.
@@ -205,16 +213,23 @@ impl<'a> Textures<'a> {
                     return Ok(known);
                 }
                 let (bytes, _) = self.buffers.view(self.root, view.value(), &element)?;
-                self.decoder.decode(bytes, &name(&element))?
+                match self.decodes {
+                    true => self.decoder.decode(bytes, &name(&element))?,
+                    false => (Image::undecoded(name(&element)), None),
+                }
             }
             (Some(uri), None) => match resolve(uri, &element)? {
+                Target::Data(_) if !self.decodes => (Image::undecoded(name(&element)), None),
                 Target::Data(bytes) => self.decoder.decode(&bytes, &name(&element))?,
                 Target::File(file) => {
                     let known = *self.by_file.entry(file.clone()).or_insert(id);
                     if known != id {
                         return Ok(known);
                     }
-                    self.decoder.decode(&read_file(self.files, &file, &element)?, &file)?
+                    match self.decodes {
+                        true => self.decoder.decode(&read_file(self.files, &file, &element)?, &file)?,
+                        false => (Image::undecoded(file), None),
+                    }
                 }
             },
             (None, None) => return Err(GltfError::Missing { element, property: "uri or bufferView" }),

@@ -84,6 +84,7 @@ fn radiance(image: Image, file: &Path) -> Result<Image, EditError> {
         Pixels::U8(v) => v.len(),
         Pixels::U16(v) => v.len(),
         Pixels::F32(v) => v.len(),
+        Pixels::Undecoded => 0,
     };
     if found != expected || found == 0 || !(1..=4).contains(&image.channels) {
         return Err(EditError::ImageSize { file: file.to_owned(), found, expected });
