@@ -18,7 +18,6 @@ const ALL: Techniques = Techniques {
     constants: true,
     coverage: true,
     useful_light: true,
-    light_paths: true,
 };
 
 /// One of opaque surfaces alone, and one with mirrors, glass, cut-outs and textures.
