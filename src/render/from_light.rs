@@ -2,9 +2,10 @@
 //!
 //! A path x₀ (camera), x₁, …, x_k (light) is found in three ways: the camera's path meets the light, or chooses it at x_{k-1}, or a path
 //! from the light comes to x₁ and is seen there. Densities are per area at each vertex (Veach 1997, chapter 10). With n light paths
-//! for each sample of a pixel, p the camera's pixels per steradian, d its distance from x₁, e the density of the light's
-//! start ([`crate::light::Emission`]: a point's times 1/π for the cosine of its direction), c the geometric cosines at a vertex towards the light and towards the camera, and →, ←
-//! the densities of BSDF sampling towards the light and back, distances and most cosines cancel in the ratio of the last to the first:
+//! for each sample of a pixel, p the camera's pixels per steradian, d its distance from x₁, e the density of the light's start
+//! ([`crate::light::Emission`]: a point's times 1/π for the cosine of its direction), c the geometric cosines at a vertex towards the
+//! light and towards the camera, and →, ← the densities of BSDF sampling towards the light and back, distances and most cosines cancel
+//! in the ratio of the last to the first:
 //!
 //! ```text
 //! n·d²/p · ∏_{1 ≤ i < k} c_light/(c_camera·→) · ∏_{2 ≤ i < k} ← · e
@@ -87,10 +88,11 @@ impl FromLight {
     }
 }
 
-/// `ratio` with the light's own part; where the ratio is 0, that is not asked for.
+/// `ratio` with the light's own part; where the ratio is 0, that is not asked for. What floats can't tell, beyond all bounds times nothing,
+/// counts as nothing.
 #[inline]
 pub(super) fn with_light(ratio: f32, emission: impl FnOnce() -> f32) -> f32 {
-    if ratio > 0.0 { ratio * emission() } else { 0.0 }
+    if ratio > 0.0 { (ratio * emission()).max(0.0) } else { 0.0 }
 }
 
 /// The density with which a path from `wi` is scattered to the viewer.

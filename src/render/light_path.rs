@@ -192,7 +192,8 @@ impl Flight {
         let per_sample = scene.light_paths.as_ref().ok()?.per_sample as f32;
         let others = self.others_with(scene, surface, wo, pdf) * density / per_sample;
         let radiance = self.beta * f * (density * power_heuristic(1.0, [others, 0.0]));
-        if radiance.is_black() {
+        // Beyond all bounds times nothing is no number: such paths are left to the camera.
+        if radiance.is_black() || others.is_nan() {
             return None;
         }
         *rays += 1;
