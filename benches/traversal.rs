@@ -24,7 +24,7 @@ use pipeline::bench::rays::{RaySet, ray_sets};
 #[path = "common/mod.rs"]
 mod common;
 
-use common::{ROUNDS, middle, prepared, timed};
+use common::{ROUNDS, in_turns, middle, prepared, timed};
 
 fn main() {
     let mut out = std::io::stdout().lock();
@@ -145,11 +145,5 @@ fn race(
     bvh2: impl Fn(&Ray) -> bool,
     cwbvh: impl Fn(&Ray) -> bool,
 ) -> [f64; 3] {
-    let mut times = [const { Vec::new() }; 3];
-    for _ in 0..ROUNDS {
-        times[0].push(timed(|| rays.iter().filter(|ray| ours(ray)).count()));
-        times[1].push(timed(|| rays.iter().filter(|ray| bvh2(ray)).count()));
-        times[2].push(timed(|| rays.iter().filter(|ray| cwbvh(ray)).count()));
-    }
-    times.map(|times| rays.len() as f64 * 1e-6 / middle(times).0)
+    in_turns(rays, ours, bvh2, cwbvh).map(|(seconds, _)| rays.len() as f64 * 1e-6 / seconds)
 }

@@ -4,13 +4,12 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{cube, emitting, lambert, scene, small, sphere, square};
+use common::{cube, emitting, lambert, scene, set_sky, small, sphere, square};
 use glam::{Vec2, Vec3};
 use pipeline::color::Rgb;
 use pipeline::disney::{Model, Parameter};
 use pipeline::render::{Control, Geometry, Prepared, Rendered, render};
 use pipeline::scene::camera::{Aperture, Lens};
-use pipeline::scene::environment::{Environment, EnvironmentMap, Equirectangular};
 use pipeline::scene::material::{NormalMap, Param, Sides, TextureChannel, TextureMap};
 use pipeline::scene::texture::{Encoding, Image, Pixels, TexelFilter, Texture, Wrap};
 use pipeline::scene::{Camera, ImageId, Material, Mesh, Scene, TextureId};
@@ -174,16 +173,7 @@ fn sunny() -> Scene {
     parts.push((ball(0.5, Vec3::new(0.7, 0.6, 0.3)), glass(0.0)));
     parts.push(lamp());
     let mut world = scene(parts, camera());
-    world.images.push(Arc::new(Image {
-        name: "sky".into(),
-        width,
-        height,
-        channels: 1,
-        pixels: Pixels::F32(values),
-    }));
-    let map = EnvironmentMap::Image { image: ImageId(0), mapping: Equirectangular::YUp };
-    world.environment =
-        Some(Environment { map, color: Rgb::new(1.0, 0.9, 0.8), intensity: 1.0, rotation: 0.4 });
+    set_sky(&mut world, [width, height], values);
     world
 }
 

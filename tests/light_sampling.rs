@@ -2,17 +2,12 @@
 
 mod common;
 
-use std::sync::Arc;
-
-use common::{emitting, lambert, render_scene, scene, small, sphere, square};
+use common::{emitting, lambert, render_scene, scene, set_sky, small, sphere, square};
 use glam::Vec3;
-use pipeline::color::Rgb;
 use pipeline::math::hash::{combine, unit_f32};
 use pipeline::render::Rendered;
-use pipeline::scene::environment::{Environment, EnvironmentMap, Equirectangular};
 use pipeline::scene::material::{Param, Sides};
-use pipeline::scene::texture::Pixels;
-use pipeline::scene::{Camera, Image, ImageId, Material, Mesh, Scene};
+use pipeline::scene::{Camera, Material, Mesh, Scene};
 use pipeline::settings::RenderSettings;
 
 fn random(i: u32, salt: u64) -> f32 {
@@ -81,16 +76,7 @@ fn sunny() -> Scene {
         values[(y * width + x) as usize] = 300.0;
     }
     let mut world = stage();
-    world.images.push(Arc::new(Image {
-        name: "sky".into(),
-        width,
-        height,
-        channels: 1,
-        pixels: Pixels::F32(values),
-    }));
-    let map = EnvironmentMap::Image { image: ImageId(0), mapping: Equirectangular::YUp };
-    world.environment =
-        Some(Environment { map, color: Rgb::new(1.0, 0.9, 0.8), intensity: 1.0, rotation: 0.4 });
+    set_sky(&mut world, [width, height], values);
     world
 }
 

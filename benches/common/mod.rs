@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3;
+use pipeline::accel::Ray;
 use pipeline::convert::ConvertOptions;
 use pipeline::import::ImportOptions;
 use pipeline::job::load;
@@ -36,6 +37,22 @@ pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let result = black_box(work());
     (start.elapsed().as_secs_f64(), result)
+}
+
+/// Seconds and number of hits of each of three ways to tell of `rays` whether they hit, which take turns.
+pub(crate) fn in_turns(
+    rays: &[Ray],
+    a: impl Fn(&Ray) -> bool,
+    b: impl Fn(&Ray) -> bool,
+    c: impl Fn(&Ray) -> bool,
+) -> [(f64, usize); 3] {
+    let mut runs = [const { Vec::new() }; 3];
+    for _ in 0..ROUNDS {
+        runs[0].push(timed(|| rays.iter().filter(|ray| a(ray)).count()));
+        runs[1].push(timed(|| rays.iter().filter(|ray| b(ray)).count()));
+        runs[2].push(timed(|| rays.iter().filter(|ray| c(ray)).count()));
+    }
+    runs.map(middle)
 }
 
 /// The run of median time.

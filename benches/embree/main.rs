@@ -24,7 +24,7 @@ use pipeline::accel::{Bvh, Ray};
 use pipeline::bench::rays::{RaySet, ray_sets};
 use pipeline::math::Real;
 
-use common::{ROUNDS, middle, prepared, timed};
+use common::{in_turns, middle, prepared, timed};
 use ffi::{Embree, Mode, Scene};
 
 const HOW_TO_GET_IT: &str = "\
@@ -243,14 +243,6 @@ fn take_turns(
     default: impl Fn(&Ray) -> bool,
     robust: impl Fn(&Ray) -> bool,
 ) -> [Outcome; 3] {
-    let mut runs = [const { Vec::new() }; 3];
-    for _ in 0..ROUNDS {
-        runs[0].push(timed(|| rays.iter().filter(|ray| ours(ray)).count()));
-        runs[1].push(timed(|| rays.iter().filter(|ray| default(ray)).count()));
-        runs[2].push(timed(|| rays.iter().filter(|ray| robust(ray)).count()));
-    }
-    runs.map(|runs| {
-        let (seconds, hits) = middle(runs);
-        Outcome { rate: rays.len() as f64 * 1e-6 / seconds, hits }
-    })
+    in_turns(rays, ours, default, robust)
+        .map(|(seconds, hits)| Outcome { rate: rays.len() as f64 * 1e-6 / seconds, hits })
 }

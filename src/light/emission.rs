@@ -6,6 +6,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 
+use super::patch::Patch;
 use super::{Distribution, Lights, NearLight};
 use crate::color::Rgb;
 use crate::math::{Frame, warp};
@@ -35,6 +36,8 @@ pub enum Emission {
         radiance: Rgb,
         /// Per steradian, and per m² across the direction.
         pdf: f32,
+        /// The density per steradian with which [`Lights::sample`] finds it.
+        pdf_light: f32,
     },
 }
 
@@ -72,29 +75,33 @@ impl Lights {
     /// direction, the third which light, the fourth to which side; the other two where light from the environment passes.
     #[inline]
     pub fn emit(&self, [u0, u1, u_light, u_side]: [f32; 4], u_disk: [f32; 2]) -> Option<Emission> {
-        let (index, chance) = self.emitters.choice.sample(u_light)?;
+        let (index, _) = self.emitters.choice.sample(u_light)?;
         if index == self.emitters.environment {
             let (wi, radiance, _) = self.environment.as_ref()?.sample([u0, u1])?;
-            let (_, pdf) = self.environment(wi)?;
+            let (_, pdf_light) = self.environment(wi)?;
             let [x, y] = warp::concentric_disk(u_disk);
             let frame = Frame::from_normal(wi);
             let across = frame.tangent * x + frame.bitangent * y;
             let origin = self.emitters.center + (across + wi) * self.emitters.radius;
-            return Some(Emission::Far { origin, wi, radiance, pdf: self.pdf_emission_far(pdf) });
+            let pdf = self.pdf_emission_far(pdf_light);
+            return Some(Emission::Far { origin, wi, radiance, pdf, pdf_light });
         }
         let NearLight::Patch(patch) = self.near.get(index)? else { return None };
-        let (triangle, barycentric, pdf) = patch.point([u0, u1]);
-        let both = patch.sides() == Sides::Both;
-        let pdf = chance * pdf * if both { 0.5 * FRAC_1_PI } else { FRAC_1_PI };
-        Some(Emission::Surface { triangle, barycentric, is_front: !both || u_side < 0.5, pdf })
+        let (triangle, barycentric) = patch.point([u0, u1]);
+        let is_front = patch.sides() == Sides::Front || u_side < 0.5;
+        Some(Emission::Surface { triangle, barycentric, is_front, pdf: self.pdf_on(index, patch) })
     }
 
     /// The density of [`Emission::Surface`] on each side of a triangle that emits; 0 for triangles that are not lights.
     #[inline]
     pub fn pdf_emission(&self, triangle: u32) -> f32 {
-        let Some((patch, part)) = self.patch_of(triangle) else { return 0.0 };
+        self.patch_of(triangle).map_or(0.0, |(patch, part)| self.pdf_on(part.light as usize, patch))
+    }
+
+    #[inline]
+    fn pdf_on(&self, index: usize, patch: &Patch) -> f32 {
         let sides = if patch.sides() == Sides::Both { 0.5 } else { 1.0 };
-        self.emitters.choice.probability(part.light as usize) * sides * patch.pdf_point() * FRAC_1_PI
+        self.emitters.choice.probability(index) * sides * patch.pdf_point() * FRAC_1_PI
     }
 
     /// The density of [`Emission::Far`] in a direction in which [`Lights::environment`] is chosen with the density `pdf`.
@@ -131,7 +138,7 @@ mod tests {
                     assert!((all.pdf_emission(triangle) / pdf - 1.0).abs() < 1e-6);
                     near += f64::from(radiance(triangle) / pdf);
                 }
-                Emission::Far { origin, wi, radiance, pdf } => {
+                Emission::Far { origin, wi, radiance, pdf, .. } => {
                     // It passes outside the sphere, in front of everything.
                     assert!(((origin - Vec3::X).dot(wi) - radius).abs() < 1e-5);
                     assert!((origin - Vec3::X - wi * radius).length() <= radius * 1.0001);

@@ -205,12 +205,12 @@ impl Patch {
         self.sides
     }
 
-    /// A triangle and a point of it, barycentric, uniform by area; and the density per m².
+    /// A triangle and a point of it, barycentric, uniform by area.
     #[inline]
-    pub(super) fn point(&self, u: [f32; 2]) -> (u32, [f32; 3], f32) {
+    pub(super) fn point(&self, u: [f32; 2]) -> (u32, [f32; 3]) {
         let (k, barycentric) = self.point_of_wedge(u);
         let found = self.wedges[k].found(Vec3::ZERO, barycentric, self.pdf_point());
-        (found.triangle, found.barycentric, found.pdf)
+        (found.triangle, found.barycentric)
     }
 
     /// The density of [`Self::point`] per m².

@@ -47,10 +47,7 @@ pub struct Rendered {
 pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderError> {
     let (width, height) = scene.size();
     let most_paths = u64::from(width) * u64::from(height) * u64::from(scene.settings.spp);
-    let from_lights = scene
-        .light_paths
-        .as_ref()
-        .map_or(0, |plan| u64::from(plan.per_sample) * u64::from(scene.settings.spp));
+    let from_lights = scene.light_paths.as_ref().map_or(0, |plan| plan.paths(scene.settings.spp));
     control.total_paths.store(most_paths + from_lights, Ordering::Relaxed);
     let mut tiles = Tile::all(scene);
     let mut lit = LightImage::new(scene);

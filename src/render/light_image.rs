@@ -65,7 +65,7 @@ impl LightImage {
         control: &Control,
     ) -> Result<(), RenderError> {
         let Ok(plan) = &scene.light_paths else { return Ok(()) };
-        let paths = u64::from(samples) * u64::from(plan.per_sample);
+        let paths = plan.paths(samples);
         let round = BATCH * (BATCHES * rayon::current_num_threads()) as u64;
         while self.paths < paths {
             let end = paths.min(self.paths + round);
@@ -122,7 +122,7 @@ impl LightImage {
     }
 
     /// The mean of each replicate at a pixel; none without light paths.
-    pub(super) fn pixel(&self, x: u32, y: u32) -> impl Iterator<Item = Rgb<f64>> {
+    pub(super) fn pixel(&self, x: u32, y: u32) -> impl Iterator<Item = Rgb<f64>> + Clone {
         let replicates = self.replicates as usize;
         let first = (y as usize * self.width as usize + x as usize) * replicates;
         let sums = self.sums.get(first..first + replicates).unwrap_or_default();

@@ -31,6 +31,13 @@ pub(super) struct LightPaths {
     pub(super) per_sample: u32,
 }
 
+impl LightPaths {
+    /// The light paths of so many samples of each pixel.
+    pub(super) fn paths(&self, samples: u32) -> u64 {
+        u64::from(samples) * u64::from(self.per_sample)
+    }
+}
+
 /// What a light path adds to the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
@@ -60,8 +67,14 @@ struct Flight {
 /// Where a light path begins.
 #[derive(Clone, Copy)]
 enum Start {
-    Surface { triangle: u32, point: Vec3 },
-    Far { wi: Vec3 },
+    Surface {
+        triangle: u32,
+        point: Vec3,
+    },
+    /// With the density of choosing its direction at a surface, the same at all.
+    Far {
+        pdf: f32,
+    },
 }
 
 /// Roulette begins at the first surface: most of what these paths are for happens there. In the Cornell boxes the error stays what it is with
@@ -138,8 +151,8 @@ fn start(scene: &Prepared, sampler: &Sampler) -> Option<Flight> {
             let ray = Ray { source: Some(triangle), ..Ray::new(origin, direction) };
             (ray, radiance, pdf, Start::Surface { triangle, point })
         }
-        Emission::Far { origin, wi, radiance, pdf } => {
-            (Ray::new(origin, -wi), radiance, pdf, Start::Far { wi })
+        Emission::Far { origin, wi, radiance, pdf, pdf_light } => {
+            (Ray::new(origin, -wi), radiance, pdf, Start::Far { pdf: pdf_light })
         }
     };
     let beta = radiance / pdf;
@@ -210,7 +223,7 @@ impl Flight {
     fn others_with(&self, scene: &Prepared, surface: &Surface<'_>, wo: Vec3, pdf: f32) -> f32 {
         let pdf_light = match self.light {
             None => 0.0,
-            Some(Start::Far { wi }) => scene.lights.environment(wi).map_or(0.0, |(_, pdf)| pdf),
+            Some(Start::Far { pdf }) => pdf,
             Some(Start::Surface { triangle, point }) => {
                 let distance = (surface.point - point).length();
                 let receiver = surface.seen_from(wo).receiver();

@@ -113,8 +113,8 @@ impl Departure {
     /// The ray in the direction `wi` to a point of a light, ending just before it.
     #[inline]
     pub(super) fn reach(&self, wi: Vec3, target: Vec3) -> Ray {
-        let ray = self.ray(wi);
-        Ray { direction: target - ray.origin, t_max: BEFORE_LIGHT, ..ray }
+        let Ray { origin, source, .. } = self.ray(wi);
+        Ray { source, ..ray_to(origin, target) }
     }
 
     /// Moves the origin of this side's rays off all triangles nearby; `has_plane` tells whether that of the one that was hit can be

@@ -94,9 +94,6 @@ impl Prepared {
         let all = |is: fn(&PreparedMaterial) -> bool| {
             scene.instances.iter().all(|i| is(&materials[i.material.0 as usize]))
         };
-        let camera_medium = medium_around(&film_camera.axis_ray(), &geometry, |triangle| {
-            &materials[scene.instances[geometry.instance_of(triangle)].material.0 as usize]
-        });
         let all_covered = all(PreparedMaterial::covers_all);
         let all_opaque = all(PreparedMaterial::blocks_shadow_rays);
         let filter = FilterSampler::new(settings.filter, settings.filter_radius);
@@ -112,13 +109,14 @@ impl Prepared {
             lights,
             width,
             height,
-            camera_medium,
+            camera_medium: None,
             all_covered,
             all_opaque,
             techniques: Techniques::default(),
             scene,
             geometry,
         };
+        prepared.camera_medium = prepared.medium_around(&prepared.camera.axis_ray());
         if let (Use::Auto, Ok(plan)) = (settings.light_paths, &prepared.light_paths) {
             let worth = pilot::light_paths(&prepared, plan);
             if !worth.pays() {
@@ -185,7 +183,10 @@ impl Prepared {
         if !self.has_media {
             return None;
         }
-        medium_around(ray, &self.geometry, |triangle| self.material_of(triangle))
+        let hit = self.geometry.bvh.closest_where(ray, |hit| self.material_of(hit.triangle).is_interface)?;
+        let normal = self.geometry.at(&hit).geometric_normal();
+        let is_behind = normal.is_some_and(|n| n.dot(ray.direction) > 0.0);
+        self.material_of(hit.triangle).absorption.filter(|_| is_behind)
     }
 
     #[inline]
@@ -229,16 +230,6 @@ fn size_for(camera: &Camera, settings: &RenderSettings) -> (u32, u32) {
             (round(f64::from(height) * aspect), height)
         }
     }
-}
-
-fn medium_around<'a>(
-    ray: &Ray,
-    geometry: &Geometry,
-    material_of: impl Fn(u32) -> &'a PreparedMaterial,
-) -> Medium {
-    let hit = geometry.bvh.closest_where(ray, |hit| material_of(hit.triangle).is_interface)?;
-    let is_behind = geometry.at(&hit).geometric_normal().is_some_and(|n| n.dot(ray.direction) > 0.0);
-    material_of(hit.triangle).absorption.filter(|_| is_behind)
 }
 
 fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), RenderError> {

@@ -189,11 +189,11 @@ impl Tile {
         let replicates = self.replicates.len() / self.sums.len().max(1);
         let of_camera = self.sums.iter().zip(self.replicates.chunks(replicates.max(1)));
         self.places().zip(of_camera).map(|((x, y), (sums, sets))| {
-            let mut sets = sets.to_vec();
-            for (set, light) in sets.iter_mut().zip(lit.pixel(x, y)) {
-                set.radiance += light * f64::from(set.count);
-            }
-            sums.pixel(&sets)
+            let of_lights = lit.pixel(x, y).chain(std::iter::repeat(Rgb::BLACK));
+            sums.pixel(sets.iter().zip(of_lights).map(|(set, light)| Replicate {
+                radiance: set.radiance + light * f64::from(set.count),
+                count: set.count,
+            }))
         })
     }
 
@@ -216,10 +216,10 @@ impl Tile {
 }
 
 impl Sums {
-    fn pixel(&self, sets: &[Replicate]) -> Pixel {
-        let samples: u32 = sets.iter().map(|set| set.count).sum();
+    fn pixel(&self, sets: impl Iterator<Item = Replicate> + Clone) -> Pixel {
+        let samples: u32 = sets.clone().map(|set| set.count).sum();
         let n = f64::from(samples.max(1));
-        let beauty = sets.iter().fold(Rgb::BLACK, |sum, set| sum + set.radiance) / n;
+        let beauty = sets.clone().fold(Rgb::BLACK, |sum, set| sum + set.radiance) / n;
         Pixel {
             beauty: beauty.cast(),
             variance: variance_of_mean(sets, beauty).cast().map(shortened),
@@ -233,8 +233,8 @@ impl Sums {
 
 /// The variance of the pixel's mean from the spread of its replicates' means, each weighed by its share of the samples: with equal
 /// shares, their sample variance divided by their number. 0 with a single replicate, which has no spread.
-fn variance_of_mean(sets: &[Replicate], mean: Rgb<f64>) -> Rgb<f64> {
-    let filled = || sets.iter().filter(|set| set.count > 0);
+fn variance_of_mean(sets: impl Iterator<Item = Replicate> + Clone, mean: Rgb<f64>) -> Rgb<f64> {
+    let filled = || sets.clone().filter(|set| set.count > 0);
     let count = filled().count();
     if count < 2 {
         return Rgb::BLACK;
@@ -265,10 +265,10 @@ mod tests {
     fn variance_of_equal_replicates_is_their_spread_over_their_number() {
         let means = [1.0, 2.0, 4.0, 5.0];
         let sets = means.map(|m| Replicate { radiance: Rgb::grey(m * 8.0), count: 8 });
-        let v = variance_of_mean(&sets, Rgb::grey(3.0));
+        let v = variance_of_mean(sets.into_iter(), Rgb::grey(3.0));
         // Sample variance (4 + 1 + 1 + 4)/3, divided by 4.
         assert!((v.r - 10.0 / 12.0).abs() < 1e-12);
-        assert_eq!(variance_of_mean(&sets[..1], Rgb::grey(1.0)), Rgb::BLACK);
+        assert_eq!(variance_of_mean(sets.into_iter().take(1), Rgb::grey(1.0)), Rgb::BLACK);
     }
 
     #[test]

@@ -9,13 +9,25 @@ use glam::{Affine3A, Vec3};
 use pipeline::color::Rgb;
 use pipeline::disney::Model;
 use pipeline::render::{Control, Geometry, Prepared, Rendered, render};
+use pipeline::scene::environment::{Environment, EnvironmentMap, Equirectangular};
 use pipeline::scene::material::{Emission, Param, Sides};
-use pipeline::scene::{Camera, Instance, Material, MaterialId, Mesh, MeshId, Named, Scene};
+use pipeline::scene::texture::{Image, Pixels};
+use pipeline::scene::{Camera, ImageId, Instance, Material, MaterialId, Mesh, MeshId, Named, Scene};
 use pipeline::settings::RenderSettings;
 
 /// A material that reflects `albedo` evenly.
 pub(crate) fn lambert(albedo: f32) -> Material {
     Material { model: Model::Diffuse, base_color: Param::Constant(Rgb::grey(albedo)), ..Material::default() }
+}
+
+/// Puts `world` under a sky of one grey value a pixel, row by row from the top.
+pub(crate) fn set_sky(world: &mut Scene, [width, height]: [u32; 2], values: Vec<f32>) {
+    let image = ImageId(world.images.len() as u32);
+    let pixels = Pixels::F32(values);
+    world.images.push(Arc::new(Image { name: "sky".into(), width, height, channels: 1, pixels }));
+    let map = EnvironmentMap::Image { image, mapping: Equirectangular::YUp };
+    let color = Rgb::new(1.0, 0.9, 0.8);
+    world.environment = Some(Environment { map, color, intensity: 1.0, rotation: 0.4 });
 }
 
 /// `material` that also emits `radiance` on both sides.
