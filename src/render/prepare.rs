@@ -20,8 +20,8 @@ use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Camera, MaterialId, Named, Scene};
 use crate::settings::{Integrator, RenderSettings, Use};
 
-/// One light path for so many camera paths. Their noise is little, so few will do: in the Cornell boxes an eighth to a half of a light
-/// path for each camera path is equally good.
+/// One light path for so many camera paths. Their noise is little, so few will do: in the Cornell boxes work is within 15% with an eighth
+/// to a half of a light path for each camera path.
 const PIXELS_PER_PATH: u32 = 4;
 /// Sums of light paths over pixels and replicates, of 24 bytes each.
 const MOST_SUMS: u64 = 1 << 28;
