@@ -123,7 +123,7 @@ pub fn measure(subject: &Subject<'_>, plan: &Plan, watch: &mut Watch<'_>) -> Res
         for &samples in &plan.levels {
             let prepared = subject.prepared(subject.planned(samples, seed)?, &subject.loaded.geometry)?;
             let what = format!("{name}: {samples} samples, seed {seed}");
-            let (Rendered { raster, counts }, seconds) = timed(&prepared, &what, watch)?;
+            let (Rendered { raster, counts, .. }, seconds) = timed(&prepared, &what, watch)?;
             let deviation = error::deviation(raster.picture(), reference.picture());
             runs.push(Run { samples, seed, seconds, rays: counts.rays, deviation });
         }

@@ -112,7 +112,7 @@ fn for_each_job(
         }
         let sweep = sweep::open(target)?;
         let mut scenes = Scenes::of(&sweep);
-        for (_, job, reading) in scenes.scene_by_scene(&sweep.jobs)? {
+        for (_, job, reading) in scenes.in_order(&sweep.jobs)? {
             act(job, scenes.get(&reading)?)?;
         }
     }
@@ -148,7 +148,7 @@ fn with_progress<T>(
         if !std::mem::take(&mut first) {
             progress.finish_job(false);
         }
-        progress.follow(name, control);
+        progress.follow(&[name], control);
     })
 }
 

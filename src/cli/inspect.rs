@@ -84,7 +84,7 @@ fn inspect(arguments: &Arguments, talk: Talk) -> Result<u8, InspectError> {
     let mut inspected = Vec::new();
     for subject in gathered.subjects {
         let control = Arc::new(Control::default());
-        progress.follow(&subject.name, &control);
+        progress.follow(&[&subject.name], &control);
         inspected.push(look(subject, options, &control)?);
         progress.finish_job(false);
     }

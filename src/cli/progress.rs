@@ -52,13 +52,18 @@ impl Progress {
         Self { bar, jobs, seen: 0, done: 0, follower: None }
     }
 
-    /// Follows a render until [`Self::finish_job`].
-    pub(super) fn follow(&mut self, name: &str, control: &Arc<Control>) {
+    /// Follows a render of the named jobs until [`Self::finish_job`].
+    pub(super) fn follow(&mut self, names: &[&str], control: &Arc<Control>) {
         if self.bar.is_hidden() {
             return;
         }
-        let short: String = name.chars().take(LONGEST_NAME).collect();
-        self.bar.set_prefix(format!("{}/{} {short}", self.seen + 1, self.jobs));
+        let (first, last) = (self.seen + 1, self.seen + names.len());
+        let numbers = if names.len() == 1 { first.to_string() } else { format!("{first}–{last}") };
+        let name: String =
+            names.first().into_iter().flat_map(|name| name.chars()).take(LONGEST_NAME).collect();
+        let more = if names.len() == 1 { "" } else { " …" };
+        self.bar.set_prefix(format!("{numbers}/{} {name}{more}", self.jobs));
+        let jobs = names.len() as u64;
         let stop = Arc::new(AtomicBool::new(false));
         let (bar, control, done, stopped) =
             (self.bar.clone(), Arc::clone(control), self.done, Arc::clone(&stop));
@@ -71,7 +76,7 @@ impl Progress {
                     // What ends first: the samples or the time.
                     let passed = control.time_limit.map_or(0.0, |limit| share(start.elapsed(), limit));
                     let steps = steps.max((passed * STEPS as f64) as u64);
-                    bar.set_position(done * STEPS + steps);
+                    bar.set_position(done * STEPS + steps * jobs);
                     let [paths, total] = [paths, total].map(|count| count as f64 * 1e-6);
                     bar.set_message(match control.time_limit {
                         None => format!("{paths:.1}/{total:.1} M samples"),
@@ -92,7 +97,8 @@ impl Progress {
             self.bar.dec_length(STEPS);
         } else {
             self.done += 1;
-            self.bar.set_position(self.done * STEPS);
+            // Others that were rendered with it may be as far already.
+            self.bar.set_position(self.bar.position().max(self.done * STEPS));
         }
     }
 

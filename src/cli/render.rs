@@ -239,7 +239,7 @@ fn render_with_progress(
     let start = Instant::now();
     let control = Arc::new(Control { time_limit, ..Control::default() });
     let mut progress = Progress::new(1, talk);
-    progress.follow(&planned.job.name, &control);
+    progress.follow(&[&planned.job.name], &control);
     let rendered = render(prepared, &control)?;
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();

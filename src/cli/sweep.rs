@@ -1,5 +1,6 @@
 //! `pipeline sweep`.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -36,6 +37,10 @@ pub(super) struct Arguments {
     /// Stop after the first job that fails.
     #[arg(long)]
     fail_fast: bool,
+    /// Render at most so many jobs at once, which differ in materials alone: what their paths have in common is traced once. 1 renders
+    /// them one by one, to the same bits. Where absent, as many as memory holds and some minutes suffice for, at most 16.
+    #[arg(long, value_name = "JOBS")]
+    together: Option<NonZeroUsize>,
     #[command(flatten)]
     allowed: Allowed,
     /// Only part I of N of the jobs; all machines split them alike.
@@ -81,6 +86,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         force: arguments.force,
         fail_fast: arguments.fail_fast,
         shard: arguments.shard,
+        together: arguments.together,
         idiff: arguments.idiff.clone(),
     };
     let mut watcher = Watcher { progress: Progress::new(count, talk), talk, said: Vec::new() };
@@ -148,8 +154,9 @@ struct Watcher {
 }
 
 impl Observer for Watcher {
-    fn started(&mut self, job: &Job, control: &Arc<Control>) {
-        self.progress.follow(&job.name, control);
+    fn started(&mut self, jobs: &[&Job], control: &Arc<Control>) {
+        let names: Vec<&str> = jobs.iter().map(|job| job.name.as_str()).collect();
+        self.progress.follow(&names, control);
     }
 
     fn finished(&mut self, record: &JobRecord, reused: bool) {

@@ -1,18 +1,19 @@
 //! A scene file into what all its jobs share.
 
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::JobError;
 use crate::convert::{ConvertOptions, Note, to_disney};
 use crate::import::{
-    ArisConfig, ArisRun, DecodedImages, FileDigest, ImportOptions, Imported, import, import_configured,
+    ArisConfig, ArisRun, DecodedImages, EnvironmentError, FileDigest, ImportOptions, Imported, import,
+    import_configured, read_environment,
 };
 use crate::library::Library;
 use crate::light::EnvironmentTables;
 use crate::record::Warning;
 use crate::render::Geometry;
-use crate::scene::{Named, Scene, framing, studio};
+use crate::scene::{Image, Named, Scene, framing, studio};
 use crate::settings::RenderSettings;
 
 /// A scene, converted and completed, with its triangles in a tree.
@@ -24,6 +25,8 @@ pub struct LoadedScene {
     pub geometry: Arc<Geometry>,
     /// What is known of its jobs' environments.
     pub environments: Arc<EnvironmentTables>,
+    /// The latest that one of them named.
+    environment_file: Arc<Mutex<Option<(PathBuf, EnvironmentFile)>>>,
     /// How it was imported and converted.
     pub import_options: ImportOptions,
     /// As above.
@@ -34,6 +37,32 @@ pub struct LoadedScene {
     pub notes: Vec<Note>,
     /// What was noticed.
     pub warnings: Vec<Warning>,
+}
+
+/// An environment image that was read from a file.
+#[derive(Clone, Debug)]
+pub(super) struct EnvironmentFile {
+    pub(super) image: Arc<Image>,
+    pub(super) digest: FileDigest,
+    pub(super) warning: Option<Warning>,
+}
+
+impl LoadedScene {
+    /// The environment image of a path: of jobs in a row that name the same it is read once.
+    pub(super) fn environment_file(&self, path: &Path) -> Result<EnvironmentFile, EnvironmentError> {
+        // A thread that panicked elsewhere has left a whole entry.
+        let mut latest = self.environment_file.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((known, file)) = &*latest
+            && known == path
+        {
+            return Ok(file.clone());
+        }
+        *latest = None;
+        let (image, digest, warning) = read_environment(path, self.import_options.reach)?;
+        let file = EnvironmentFile { image: Arc::new(image), digest, warning };
+        *latest = Some((path.to_owned(), file.clone()));
+        Ok(file)
+    }
 }
 
 /// Imports and converts a scene and lays the library `materials` over its materials. One without a camera is framed, one without light is lit by a studio, and a warning says so.
@@ -131,6 +160,7 @@ fn loaded(
         scene: Arc::new(scene),
         geometry,
         environments: Arc::default(),
+        environment_file: Arc::default(),
         import_options: import_options.clone(),
         convert_options: convert_options.clone(),
         files,

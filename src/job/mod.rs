@@ -6,6 +6,7 @@
 mod identity;
 mod load;
 mod run;
+mod together;
 
 use std::path::PathBuf;
 
@@ -13,8 +14,9 @@ pub use identity::Build;
 pub use load::{LoadedRun, LoadedScene, load, load_configured};
 pub use run::{
     Destination, PlannedJob, References, failed_record, finished, image_path, plan, recheck, record_path,
-    recorded, reference_of, run,
+    recorded, reference_of,
 };
+pub use together::{Ready, keep_record, prepare, run, run_together};
 
 /// Why a job can't be done.
 #[derive(Debug, thiserror::Error)]

@@ -2,21 +2,21 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::identity::identify;
+use super::load::EnvironmentFile;
 use super::{Build, JobError, LoadedScene};
 use crate::compare::{self, Options, StrictLimits, Thresholds, strict};
 use crate::imagefile;
-use crate::import::{FileDigest, read_environment};
+use crate::import::FileDigest;
 use crate::manifest::edit;
-use crate::output::{Provenance, stamp};
+use crate::output::Provenance;
 use crate::raster::{Attribute, Layer, Raster};
 use crate::record::{Counts, CrossCheck, Job, JobRecord, Outcome, Timings, Verdict, Warning};
-use crate::render::{Control, Prepared, Rendered, image_size, render};
+use crate::render::image_size;
 use crate::scene::Scene;
 use crate::settings::RenderSettings;
 
@@ -95,11 +95,14 @@ pub fn plan(job: &Job, loaded: &LoadedScene, build: &Build) -> Result<PlannedJob
     let mut warnings: Vec<Warning> = Vec::new();
     check_environment(job, &scene)?;
     edit::apply_all(&mut scene, &mut settings, &job.overrides, &mut |path| {
-        let (image, digest, replaced) = read_environment(path, loaded.import_options.reach)?;
+        let EnvironmentFile { image, digest, warning } = loaded.environment_file(path)?;
         images.push(digest);
-        warnings.extend(replaced);
+        warnings.extend(warning);
         Ok(image)
     })?;
+    for image in &mut scene.images[loaded.scene.images.len()..] {
+        *image = loaded.environments.known(image);
+    }
     // However the size is given, it is the same image.
     let (width, height) = image_size(&scene, &settings)?;
     (settings.width, settings.height) = (Some(width), Some(height));
@@ -140,36 +143,6 @@ fn is_intact(record: &JobRecord, folder: &Path) -> bool {
     !record.outputs.is_empty() && record.outputs.iter().all(intact)
 }
 
-/// Renders a job, writes its image, compares it, and writes its record last. What fails is told in the record.
-///
-/// # Errors
-/// If not even the record can be written.
-pub fn run(
-    planned: &PlannedJob,
-    loaded: &LoadedScene,
-    build: &Build,
-    destination: &Destination,
-    control: &Control,
-) -> Result<JobRecord, JobError> {
-    let mut record = blank_record(&planned.job, build, &destination.folder);
-    record.identity.clone_from(&planned.identity);
-    record.key.clone_from(&planned.key);
-    record.warnings = loaded.warnings.iter().chain(&planned.warnings).cloned().collect();
-    // A panic is a bug, but no reason to take the other jobs down.
-    let caught =
-        catch_unwind(AssertUnwindSafe(|| attempt(planned, loaded, build, destination, control, &mut record)));
-    match caught {
-        Ok(Ok(())) => {}
-        Ok(Err(error)) => record.outcome = Outcome::Failed { error: error.to_string() },
-        Err(_) => {
-            let error = "a bug in this program: the job panicked; the message is on stderr".to_owned();
-            record.outcome = Outcome::Failed { error };
-        }
-    }
-    write_record(&record, &destination.folder)?;
-    Ok(record)
-}
-
 /// The record of finished work on this very job, whatever the state of its scene and of the program: its image is intact.
 pub fn recorded(job: &Job, folder: &Path) -> Option<JobRecord> {
     let record = read_record(&record_path(folder, &job.name)).ok()?;
@@ -189,50 +162,6 @@ pub fn failed_record(job: &Job, build: &Build, folder: &Path, error: &str) -> Re
         write_record(&record, folder)?;
     }
     Ok(record)
-}
-
-fn attempt(
-    planned: &PlannedJob,
-    loaded: &LoadedScene,
-    build: &Build,
-    destination: &Destination,
-    control: &Control,
-    record: &mut JobRecord,
-) -> Result<(), JobError> {
-    let start = Instant::now();
-    let prepared = Prepared::sharing(
-        Arc::clone(&planned.scene),
-        Arc::clone(&loaded.geometry),
-        &loaded.environments,
-        &planned.settings,
-    )?;
-    record.size = [prepared.size().0, prepared.size().1];
-    record.skipped = prepared.skipped();
-    record.timings.prepare = start.elapsed().as_secs_f64();
-
-    let start = Instant::now();
-    let Rendered { mut raster, counts } = render(&prepared, control)?;
-    record.timings.render = start.elapsed().as_secs_f64();
-    if counts.bad_samples > 0 {
-        let message = format!("{} samples were not finite or negative and were dropped", counts.bad_samples);
-        record.warnings.push(Warning::new(&planned.job.name, message));
-    }
-    record.counts = counts;
-
-    let start = Instant::now();
-    stamp(&mut raster, &planned.provenance(build, None));
-    let encoded = imagefile::encode_exr(&raster)?;
-    let path = image_path(&destination.folder, &planned.job.name);
-    imagefile::write_whole(&path, &encoded.bytes)?;
-    let digest = blake3::hash(&encoded.bytes).to_hex().to_string();
-    record.outputs.insert(format!("{}.exr", planned.job.name), digest);
-    record.outcome = Outcome::Done;
-    if let Some(references) = &destination.references {
-        (record.verdict, record.cross_check) =
-            compare_with_reference(&path, &raster, &planned.job.name, references);
-    }
-    record.timings.output = start.elapsed().as_secs_f64();
-    Ok(())
 }
 
 /// Compares the finished image of an earlier run again, since references may have changed, and keeps the new verdict.
@@ -257,7 +186,7 @@ pub fn recheck(record: &mut JobRecord, destination: &Destination) -> Result<(), 
 
 /// Compares a result with its reference by the built-in comparator, and lets the real `idiff` confirm it. The reference decides
 /// which of the result's channels are compared.
-fn compare_with_reference(
+pub(super) fn compare_with_reference(
     path: &Path,
     result: &Raster,
     name: &str,
@@ -325,7 +254,7 @@ pub fn reference_of(result: &Raster) -> Raster {
     Raster { display: result.display, layers }
 }
 
-fn blank_record(job: &Job, build: &Build, folder: &Path) -> JobRecord {
+pub(super) fn blank_record(job: &Job, build: &Build, folder: &Path) -> JobRecord {
     let earlier = read_record(&record_path(folder, &job.name)).map_or(0, |r| r.attempt);
     JobRecord {
         job: job.clone(),
@@ -351,7 +280,7 @@ fn read_record(path: &Path) -> Result<JobRecord, JobError> {
 }
 
 /// Writes a record to its place.
-fn write_record(record: &JobRecord, folder: &Path) -> Result<(), JobError> {
+pub(super) fn write_record(record: &JobRecord, folder: &Path) -> Result<(), JobError> {
     let path = record_path(folder, &record.job.name);
     let mut text = serde_json::to_vec_pretty(record).expect("plain data has a JSON form");
     text.push(b'\n');

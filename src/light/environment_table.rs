@@ -172,6 +172,13 @@ struct Kept {
 const MOST_KEPT: usize = 4;
 
 impl EnvironmentTables {
+    /// The image of the same pixels that a table is known of, if there is one, else `image` itself.
+    pub fn known(&self, image: &Arc<Image>) -> Arc<Image> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = kept.iter().find(|k| Arc::ptr_eq(&k.image, image) || k.image == *image);
+        Arc::clone(found.map_or(image, |k| &k.image))
+    }
+
     /// The table of an image, be it the same one or one of the same pixels.
     pub fn get(
         &self,

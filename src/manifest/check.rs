@@ -1,6 +1,7 @@
 //! A manifest against a scene, before anything renders.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::edit::{BoxedError, EditError, EnvironmentField, Half, Target, apply, apply_all};
 use super::error::{Diagnostic, ManifestError, ManifestErrors};
@@ -179,7 +180,7 @@ impl Checker<'_> {
 }
 
 /// Stands for every image: what is in them does not matter here.
-fn no_image(file: &Path) -> Result<Image, BoxedError> {
+fn no_image(file: &Path) -> Result<Arc<Image>, BoxedError> {
     let name = file.display().to_string();
-    Ok(Image { name, width: 1, height: 1, channels: 3, pixels: Pixels::F32(vec![1.0; 3]) })
+    Ok(Arc::new(Image { name, width: 1, height: 1, channels: 3, pixels: Pixels::F32(vec![1.0; 3]) }))
 }

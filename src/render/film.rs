@@ -10,7 +10,9 @@ use super::integrators::integrate;
 use super::light_image::LightImage;
 use super::path::{PathSample, ReplayVertex};
 use super::tile::{NAMED_BAD_SAMPLES, Pixel, Tile, levels};
+use super::variants::Variants;
 use super::{Prepared, RenderError};
+use crate::accel::Ray;
 use crate::math::sobol::{Purpose, Sampler};
 use crate::raster::{Layer, Raster, Window};
 use crate::record::Counts;
@@ -35,6 +37,8 @@ pub struct Rendered {
     pub raster: Raster,
     /// What was counted.
     pub counts: Counts,
+    /// How many of the rays were traced for other variants too.
+    pub shared_rays: u64,
 }
 
 /// Renders every pixel on the current rayon pool.
@@ -45,48 +49,135 @@ pub struct Rendered {
 /// # Errors
 /// [`RenderError::Cancelled`] if `control.stop` was set before the end.
 pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderError> {
-    let (width, height) = scene.size();
-    let most_paths = u64::from(width) * u64::from(height) * u64::from(scene.settings.spp);
-    let from_lights = scene.light_paths.as_ref().map_or(0, |plan| plan.paths(scene.settings.spp));
-    control.total_paths.store(most_paths + from_lights, Ordering::Relaxed);
-    let mut tiles = Tile::all(scene);
-    let mut lit = LightImage::new(scene);
+    let mut picture = None;
+    render_together(&Variants::alone(scene), control, |_, rendered| picture = Some(rendered))?;
+    picture.ok_or(RenderError::Cancelled)
+}
+
+/// Renders all variants at once, and gives each one's index and picture to `done`: the same bits as [`render`] makes of each, but what
+/// their paths have in common is traced once.
+///
+/// # Errors
+/// As above.
+pub fn render_together(
+    variants: &Variants<'_>,
+    control: &Control,
+    mut done: impl FnMut(usize, Rendered),
+) -> Result<(), RenderError> {
+    let scenes = variants.scenes();
+    let Some(&first) = scenes.first() else { return Ok(()) };
+    let settings = &first.settings;
+    let total: u64 = scenes.iter().map(|scene| most_paths(scene)).sum();
+    control.total_paths.store(total, Ordering::Relaxed);
+    // At each place of the picture, one tile for each variant.
+    let mut stacks: Vec<Vec<Tile>> =
+        Tile::all(first).into_iter().map(|tile| vec![tile; scenes.len()]).collect();
+    let mut lit: Vec<LightImage> = scenes.iter().map(|scene| LightImage::new(scene)).collect();
     let deadline = control.time_limit.map(|limit| Instant::now() + limit);
-    let may_end_early = deadline.is_some() || scene.settings.error.is_some();
-    for samples in levels(&scene.settings).filter(|&n| may_end_early || n == scene.settings.spp) {
+    let may_end_early = deadline.is_some() || settings.error.is_some();
+    for samples in levels(settings).filter(|&n| may_end_early || n == settings.spp) {
         // Every tile gets its first samples, also after the deadline: a picture has no holes.
         let is_late = || deadline.is_some_and(|deadline| Instant::now() >= deadline);
-        let is_enough = tiles.iter().all(|tile| tile.is_finished);
-        if is_enough || (tiles.iter().all(|tile| tile.samples > 0) && is_late()) {
+        if is_late() && stacks.iter().flatten().all(|tile| tile.samples > 0) {
             break;
         }
-        lit.sample_up_to(scene, samples, control)?;
-        tiles.par_iter_mut().try_for_each(|tile| {
-            let ends = tile.samples > 0 && is_late();
-            if ends { Ok(()) } else { tile.sample_up_to(scene, samples, &lit, control) }
+        for (variant, (lit, scene)) in lit.iter_mut().zip(scenes).enumerate() {
+            if stacks.iter().any(|stack| !stack[variant].is_finished) {
+                lit.sample_up_to(scene, samples, control)?;
+            }
+        }
+        stacks.par_iter_mut().try_for_each(|stack| {
+            let ends = is_late() && stack.iter().all(|tile| tile.samples > 0);
+            if ends { Ok(()) } else { sample_up_to(variants, stack, samples, &lit, control) }
         })?;
     }
+    for (variant, (scene, lit)) in scenes.iter().zip(&lit).enumerate() {
+        let tiles = stacks.iter_mut().map(|stack| std::mem::take(&mut stack[variant]));
+        done(variant, developed(scene, tiles, lit));
+    }
+    Ok(())
+}
 
+/// Camera and light paths that the settings allow.
+fn most_paths(scene: &Prepared) -> u64 {
+    let (width, height) = scene.size();
+    let from_lights = scene.light_paths.as_ref().map_or(0, |plan| plan.paths(scene.settings.spp));
+    u64::from(width) * u64::from(height) * u64::from(scene.settings.spp) + from_lights
+}
+
+/// Goes on with the tiles at one place until the pixels of those that are not finished have `samples` of them.
+fn sample_up_to(
+    variants: &Variants<'_>,
+    tiles: &mut [Tile],
+    samples: u32,
+    lit: &[LightImage],
+    control: &Control,
+) -> Result<(), RenderError> {
+    let settings = &variants.scenes()[0].settings;
+    let going: Vec<usize> = (0..tiles.len()).filter(|&variant| !tiles[variant].is_finished).collect();
+    let Some(&any) = going.first() else { return Ok(()) };
+    for &variant in &going {
+        tiles[variant].begin(settings);
+    }
+    // They began together and go on together.
+    let taken = tiles[any].samples;
+    for pixel in 0..tiles[any].area() as usize {
+        if control.stop.load(Ordering::Relaxed) {
+            return Err(RenderError::Cancelled);
+        }
+        let (x, y) = tiles[any].place(pixel);
+        for sample in taken..samples {
+            variants.sample(&going, (x, y), sample, |variant, path, shared_rays| {
+                tiles[variant].add(pixel, sample, path);
+                tiles[variant].shared_rays += shared_rays;
+            });
+        }
+        control.paths.fetch_add(u64::from(samples - taken) * going.len() as u64, Ordering::Relaxed);
+    }
+    for variant in going {
+        let spared = tiles[variant].end(settings, samples, &lit[variant]);
+        control.paths.fetch_add(spared, Ordering::Relaxed);
+    }
+    Ok(())
+}
+
+/// The picture that the tiles make.
+fn developed(scene: &Prepared, tiles: impl Iterator<Item = Tile>, lit: &LightImage) -> Rendered {
+    let (width, height) = scene.size();
     let mut pixels = vec![Pixel::default(); width as usize * height as usize];
-    let rays = lit.rays;
     let mut counts = Counts {
-        rays,
+        rays: lit.rays,
         bad_samples: lit.bad_count,
         triangles: scene.geometry.triangle_count() as u64,
         ..Counts::default()
     };
+    let mut shared_rays = 0;
     for mut tile in tiles {
+        shared_rays += tile.shared_rays;
         counts.rays += tile.rays;
         counts.paths += u64::from(tile.samples) * tile.area();
         counts.bad_samples += tile.bad_count;
         counts.first_bad_samples.append(&mut tile.bad);
-        for ((x, y), pixel) in tile.pixels(&lit) {
+        for ((x, y), pixel) in tile.pixels(lit) {
             pixels[y as usize * width as usize + x as usize] = pixel;
         }
     }
     counts.first_bad_samples.sort_unstable_by_key(|b| (b.y, b.x, b.sample));
     counts.first_bad_samples.truncate(NAMED_BAD_SAMPLES);
-    Ok(Rendered { raster: layers(scene, &pixels), counts })
+    Rendered { raster: layers(scene, &pixels), counts, shared_rays }
+}
+
+/// The random numbers of a sample of a pixel, and the ray that its path begins with.
+#[inline]
+pub(super) fn camera_sample(scene: &Prepared, x: u32, y: u32, sample: u32) -> (Sampler, Ray) {
+    let settings = &scene.settings;
+    // Samples that are sets of their own are independent.
+    let sets = if scene.techniques.sobol { settings.effective_replicates() } else { settings.spp };
+    let sampler = Sampler::new(settings.seed, x, y, sample, sets);
+    let [u0, u1, u2, u3] = sampler.set(0, Purpose::Camera);
+    let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+    let film = center + Vec2::new(scene.filter.offset(u0), scene.filter.offset(u1));
+    (sampler, scene.camera.ray(film, [u2, u3]))
 }
 
 /// One sample of a pixel: a pure function of scene, settings and the three numbers.
@@ -98,14 +189,8 @@ pub(super) fn sample_pixel(
     sample: u32,
     inspect: impl FnMut(ReplayVertex),
 ) -> PathSample {
-    let settings = &scene.settings;
-    // Samples that are sets of their own are independent.
-    let sets = if scene.techniques.sobol { settings.effective_replicates() } else { settings.spp };
-    let sampler = Sampler::new(settings.seed, x, y, sample, sets);
-    let [u0, u1, u2, u3] = sampler.set(0, Purpose::Camera);
-    let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-    let film = center + Vec2::new(scene.filter.offset(u0), scene.filter.offset(u1));
-    integrate(scene, &sampler, scene.camera.ray(film, [u2, u3]), inspect)
+    let (sampler, ray) = camera_sample(scene, x, y, sample);
+    integrate(scene, &sampler, ray, inspect)
 }
 
 /// The two parts of the result: `beauty` alone in the first, so that tools that compare first parts compare the picture.

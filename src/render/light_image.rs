@@ -48,6 +48,12 @@ struct Batch {
     bad_count: u64,
 }
 
+/// Memory for the sums of a pixel.
+pub(super) fn bytes_a_pixel(scene: &Prepared) -> u64 {
+    let replicates = if scene.light_paths.is_ok() { scene.settings.effective_replicates() } else { 0 };
+    u64::from(replicates) * size_of::<Rgb<f64>>() as u64
+}
+
 impl LightImage {
     pub(super) fn new(scene: &Prepared) -> Self {
         let (width, height) = scene.size();

@@ -23,16 +23,18 @@ mod skipped;
 mod surface;
 mod techniques;
 mod tile;
+mod variants;
 
 use crate::accel::BuildError;
 
-pub use film::{Control, Rendered, render};
+pub use film::{Control, Rendered, render, render_together};
 pub use geometry::Geometry;
 pub use material::constant_bsdf;
 pub use offset::Departure;
 pub use path::{Replay, ReplayVertex, replay};
 pub use prepare::{Prepared, image_size};
 pub use techniques::Techniques;
+pub use variants::Variants;
 
 /// Why a scene can't be rendered.
 #[derive(Debug, thiserror::Error)]

@@ -63,6 +63,11 @@ pub(super) struct Strategies {
 }
 
 impl Strategies {
+    #[inline]
+    fn of(scene: &Prepared) -> Self {
+        Self { nee: scene.settings.nee, mis: scene.settings.mis }
+    }
+
     /// What a path counts that met a light which light paths find `from_light` times as densely. `pdfs`: the density of the BSDF sample that
     /// led there, and that of sampling the light; none if it can't be sampled.
     #[inline]
@@ -100,126 +105,240 @@ pub(super) fn trace(
     scene: &Prepared,
     sampler: &Sampler,
     camera_ray: Ray,
-    mut inspect: impl FnMut(ReplayVertex),
+    inspect: impl FnMut(ReplayVertex),
 ) -> PathSample {
-    let strategies = Strategies { nee: scene.settings.nee, mis: scene.settings.mis };
-    let mut path = PathSample::default();
-    let mut ray = camera_ray;
-    let mut beta = Rgb::WHITE;
-    let mut last_scatter: Option<LastScatter> = None;
-    // Radiance grows by eta² on entering glass and shrinks again on leaving: roulette must not see that.
-    let mut eta_scale = 1.0f32;
-    let mut scatterings = 0;
-    let mut medium = scene.camera_medium;
-    let mut from_light = FromLight::CAMERA;
+    Walk::new(scene, camera_ray).go_on(scene, sampler, None, |_| false, inspect).path()
+}
 
-    for vertex in 1.. {
-        // Find the next surface, or leave the scene.
-        path.rays += 1;
-        let Some(hit) = next_surface(scene, sampler, vertex, &ray, ray.direction) else {
-            if let Some((radiance, pdf_light)) = scene.lights.environment(ray.direction) {
-                let emission = || scene.lights.pdf_emission_far(pdf_light);
-                let w_bsdf = strategies
-                    .w_bsdf(last_scatter.map(|s| (s.pdf, pdf_light)), from_light.at_light(emission));
-                path.radiance += beta * radiance * w_bsdf * medium::transmittance(medium, f32::INFINITY);
+/// A path under way, on the ray that its last surface sent out.
+#[derive(Clone, Copy)]
+pub(super) struct Walk {
+    path: PathSample,
+    camera_ray: Ray,
+    ray: Ray,
+    /// The surfaces it met.
+    vertices: u32,
+    beta: Rgb,
+    last_scatter: Option<LastScatter>,
+    /// Radiance grows by eta² on entering glass and shrinks again on leaving: roulette must not see that.
+    eta_scale: f32,
+    scatterings: u32,
+    medium: Medium,
+    from_light: FromLight,
+}
+
+/// How far a path went.
+pub(super) enum Walked {
+    /// To its end.
+    Over(PathSample),
+    /// To a surface where it was to stop, which has not scattered it yet.
+    Before(Walk, Hit),
+}
+
+impl Walked {
+    fn path(self) -> PathSample {
+        match self {
+            Self::Over(path) | Self::Before(Walk { path, .. }, _) => path,
+        }
+    }
+}
+
+impl Walk {
+    pub(super) fn new(scene: &Prepared, camera_ray: Ray) -> Self {
+        Self {
+            path: PathSample::default(),
+            camera_ray,
+            ray: camera_ray,
+            vertices: 0,
+            beta: Rgb::WHITE,
+            last_scatter: None,
+            eta_scale: 1.0,
+            scatterings: 0,
+            medium: scene.camera_medium,
+            from_light: FromLight::CAMERA,
+        }
+    }
+
+    /// Goes on, from the surface `met` if it stopped there, until the path ends or meets one where it `stops`. `inspect` is called at each
+    /// surface with the radiance gathered so far.
+    #[inline(always)]
+    pub(super) fn go_on(
+        mut self,
+        scene: &Prepared,
+        sampler: &Sampler,
+        mut met: Option<Hit>,
+        stops: impl Fn(&Hit) -> bool,
+        mut inspect: impl FnMut(ReplayVertex),
+    ) -> Walked {
+        loop {
+            let hit = match met.take() {
+                Some(hit) => hit,
+                None => {
+                    self.vertices += 1;
+                    self.path.rays += 1;
+                    let Some(hit) =
+                        next_surface(scene, sampler, self.vertices, &self.ray, self.ray.direction)
+                    else {
+                        self.leave_scene(scene);
+                        break;
+                    };
+                    if stops(&hit) {
+                        return Walked::Before(self, hit);
+                    }
+                    hit
+                }
+            };
+            if self.scatter(scene, sampler, &hit, &mut inspect).is_break() {
+                break;
             }
-            break;
-        };
-        let surface = Surface::new(scene, &ray, &hit);
-        medium = surface.medium_before(medium);
-        if medium.is_some() {
-            beta *= medium::transmittance(medium, hit.t);
         }
+        Walked::Over(self.path)
+    }
 
-        // Add what the surface sends out by itself.
-        let emitted = surface.emitted(scene);
-        if !emitted.is_black() {
-            let pdfs = last_scatter.map(|s| {
-                let distance = (surface.point - s.receiver.point).length();
-                (s.pdf, scene.lights.pdf_triangle(&s.receiver, surface.triangle, ray.direction, distance))
-            });
-            let emission = || scene.lights.pdf_emission(surface.triangle);
-            let w_bsdf = strategies.w_bsdf(pdfs, from_light.at_light(emission));
-            path.radiance += beta * emitted * w_bsdf;
+    /// The number of rays so far.
+    pub(super) fn rays(&self) -> u64 {
+        self.path.rays
+    }
+
+    /// Goes on to the end from a surface where it stopped.
+    pub(super) fn finish(self, scene: &Prepared, sampler: &Sampler, met: Hit) -> PathSample {
+        self.go_on(scene, sampler, Some(met), |_| false, |_| ()).path()
+    }
+
+    /// Meets nothing but the environment.
+    #[inline(always)]
+    fn leave_scene(&mut self, scene: &Prepared) {
+        if let Some((radiance, pdf_light)) = scene.lights.environment(self.ray.direction) {
+            let emission = || scene.lights.pdf_emission_far(pdf_light);
+            let pdfs = self.last_scatter.map(|s| (s.pdf, pdf_light));
+            let w_bsdf = Strategies::of(scene).w_bsdf(pdfs, self.from_light.at_light(emission));
+            let passing = medium::transmittance(self.medium, f32::INFINITY);
+            self.path.radiance += self.beta * radiance * w_bsdf * passing;
         }
-        if last_scatter.is_none() {
-            path.radiance += beta * surface.unlit(scene);
+    }
+
+    /// Gathers what a surface sends towards the viewer, and lets it send the path on; breaks where it ends.
+    #[inline(always)]
+    fn scatter(
+        &mut self,
+        scene: &Prepared,
+        sampler: &Sampler,
+        hit: &Hit,
+        inspect: &mut impl FnMut(ReplayVertex),
+    ) -> ControlFlow<()> {
+        let surface = Surface::new(scene, &self.ray, hit);
+        self.medium = surface.medium_before(self.medium);
+        if self.medium.is_some() {
+            self.beta *= medium::transmittance(self.medium, hit.t);
         }
+        self.add_emitted(scene, &surface);
 
         // Work out how it scatters.
         let mut varying = None;
         let shading = surface.shading(scene, &mut varying);
-        if path.first.is_none() {
-            path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
+        if self.path.first.is_none() {
+            self.path.first = Some(first_hit(scene, &self.camera_ray, &surface, shading.as_ref()));
         }
         inspect(ReplayVertex {
             point: (surface.point + scene.geometry.origin()).into(),
-            radiance: path.radiance,
-            beta,
+            radiance: self.path.radiance,
+            beta: self.beta,
         });
-        let Some(shading) = shading else { break };
-        if scatterings == scene.settings.max_depth {
+        let Some(shading) = shading else { return ControlFlow::Break(()) };
+        if self.scatterings == scene.settings.max_depth {
             // Going straight through a clear sheet is no scattering: shadow rays do it too.
-            let Some(passing) = shading.bsdf.straight_transmittance(shading.wo) else { break };
-            beta *= passing;
-            ray = surface.leave(ray.direction);
-            continue;
+            let passing = shading.bsdf.straight_transmittance(shading.wo);
+            let Some(passing) = passing else { return ControlFlow::Break(()) };
+            self.beta *= passing;
+            self.ray = surface.leave(self.ray.direction);
+            return ControlFlow::Continue(());
         }
 
-        from_light.arrive(scene, &camera_ray, &surface);
+        self.from_light.arrive(scene, &self.camera_ray, &surface);
         // Sample a light, unless no light could be reflected from it.
         let may_reflect = !(shading.bsdf.is_delta() && scene.techniques.useful_light);
         if may_reflect && !scene.lights.is_empty() {
-            let u = sampler.set(vertex, Purpose::Light);
+            let u = sampler.set(self.vertices, Purpose::Light);
             if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
-                let ways = Ways { strategies, from_light };
-                path.radiance +=
-                    beta * direct_light(scene, &surface, &shading, &sample, ways, medium, &mut path.rays);
+                let ways = Ways { strategies: Strategies::of(scene), from_light: self.from_light };
+                let mut rays = 0;
+                let direct = direct_light(scene, &surface, &shading, &sample, ways, self.medium, &mut rays);
+                self.path.radiance += self.beta * direct;
+                self.path.rays += rays;
             }
         }
+        self.send_on(scene, &surface, &shading, sampler.set(self.vertices, Purpose::Bsdf))
+    }
 
-        // Sample the BSDF for the next direction.
-        let [u_lobe, u0, u1, u_roulette] = sampler.set(vertex, Purpose::Bsdf);
-        let Some(sample) = shading.bsdf.sample(shading.wo, u_lobe, [u0, u1]) else { break };
+    /// Adds what a surface sends out by itself.
+    #[inline(always)]
+    fn add_emitted(&mut self, scene: &Prepared, surface: &Surface<'_>) {
+        let emitted = surface.emitted(scene);
+        if !emitted.is_black() {
+            let pdfs = self.last_scatter.map(|s| {
+                let distance = (surface.point - s.receiver.point).length();
+                let (triangle, wi) = (surface.triangle, self.ray.direction);
+                (s.pdf, scene.lights.pdf_triangle(&s.receiver, triangle, wi, distance))
+            });
+            let emission = || scene.lights.pdf_emission(surface.triangle);
+            let w_bsdf = Strategies::of(scene).w_bsdf(pdfs, self.from_light.at_light(emission));
+            self.path.radiance += self.beta * emitted * w_bsdf;
+        }
+        if self.last_scatter.is_none() {
+            self.path.radiance += self.beta * surface.unlit(scene);
+        }
+    }
+
+    /// Samples the BSDF for the next direction; breaks where the path ends.
+    #[inline(always)]
+    fn send_on(
+        &mut self,
+        scene: &Prepared,
+        surface: &Surface<'_>,
+        shading: &Shading<'_>,
+        [u_lobe, u0, u1, u_roulette]: [f32; 4],
+    ) -> ControlFlow<()> {
+        let sample = shading.bsdf.sample(shading.wo, u_lobe, [u0, u1]);
+        let Some(sample) = sample else { return ControlFlow::Break(()) };
         let goes_straight = sample.lobe == Lobe::StraightTransmission;
         let wi = match goes_straight {
-            true => ray.direction,
+            true => self.ray.direction,
             false => shading.frame.world_from_local(sample.wi).normalize(),
         };
         if surface.same_side(wi) == sample.lobe.is_transmission() {
-            break;
+            return ControlFlow::Break(());
         }
-        beta *= sample.f * (sample.wi.z.abs() / sample.pdf);
-        if beta.is_black() {
-            break;
+        self.beta *= sample.f * (sample.wi.z.abs() / sample.pdf);
+        if self.beta.is_black() {
+            return ControlFlow::Break(());
         }
-        ray = surface.leave(wi);
-        medium = surface.medium_towards(wi, medium);
+        self.ray = surface.leave(wi);
+        self.medium = surface.medium_towards(wi, self.medium);
         // What a clear sheet lets pass was weighed, and is still to be, as if the sheet were not there.
         if goes_straight {
-            continue;
+            return ControlFlow::Continue(());
         }
-        eta_scale *= sample.eta * sample.eta;
-        scatterings += 1;
-        last_scatter =
+        self.eta_scale *= sample.eta * sample.eta;
+        self.scatterings += 1;
+        self.last_scatter =
             (!sample.lobe.is_delta()).then(|| LastScatter { receiver: surface.receiver(), pdf: sample.pdf });
-        match last_scatter {
-            None => from_light.mirror(scene, &surface, &shading, wi),
+        match self.last_scatter {
+            None => self.from_light.mirror(scene, surface, shading, wi),
             Some(_) => {
-                from_light.scatter(from_light.towards(scene, &surface, &shading, wi), sample.pdf);
+                self.from_light.scatter(self.from_light.towards(scene, surface, shading, wi), sample.pdf);
             }
         }
 
         // End paths that carry little, and let survivors stand for them.
-        if scatterings > ROULETTE_START && scene.techniques.roulette {
-            let survival = (beta.max_channel() * eta_scale).min(MAX_SURVIVAL);
+        if self.scatterings > ROULETTE_START && scene.techniques.roulette {
+            let survival = (self.beta.max_channel() * self.eta_scale).min(MAX_SURVIVAL);
             if u_roulette >= survival {
-                break;
+                return ControlFlow::Break(());
             }
-            beta = beta / survival;
+            self.beta = self.beta / survival;
         }
+        ControlFlow::Continue(())
     }
-    path
 }
 
 /// The nearest surface that is there for this path: a partly transparent one lets its share of paths pass. Each triangle decides

@@ -191,7 +191,12 @@ impl Prepared {
 
     #[inline]
     pub(super) fn material_of(&self, triangle: u32) -> &PreparedMaterial {
-        &self.materials[self.material_of[self.geometry.instance_of(triangle)].0 as usize]
+        &self.materials[self.material_index(triangle)]
+    }
+
+    #[inline]
+    pub(super) fn material_index(&self, triangle: u32) -> usize {
+        self.material_of[self.geometry.instance_of(triangle)].0 as usize
     }
 }
 

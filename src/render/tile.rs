@@ -1,12 +1,10 @@
 //! The tiles that threads work on: what their pixels' samples add up to, and whether that is enough.
 
-use std::sync::atomic::Ordering;
-
 use glam::{DVec3, Vec3};
 
-use super::film::{Control, sample_pixel};
+use super::Prepared;
 use super::light_image::LightImage;
-use super::{Prepared, RenderError};
+use super::path::PathSample;
 use crate::color::Rgb;
 use crate::math::stats::relative_square;
 use crate::record::BadSample;
@@ -50,7 +48,7 @@ struct Replicate {
 }
 
 /// A rectangle of pixels under way.
-#[derive(Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Tile {
     x0: u32,
     y0: u32,
@@ -61,6 +59,8 @@ pub(super) struct Tile {
     /// The settings ask for no more.
     pub(super) is_finished: bool,
     pub(super) rays: u64,
+    /// Those of them that were traced for other variants too.
+    pub(super) shared_rays: u64,
     pub(super) bad_count: u64,
     /// The first of them.
     pub(super) bad: Vec<BadSample>,
@@ -79,6 +79,12 @@ pub(super) fn levels(settings: &RenderSettings) -> impl Iterator<Item = u32> + u
     doubled.take_while(move |n| *n < most).chain(std::iter::once(most))
 }
 
+/// Memory for a pixel until its picture is finished: that of the result, and of the sums as well while the settings let all tiles go on.
+pub(super) fn bytes_a_pixel(settings: &RenderSettings) -> u64 {
+    let sums = size_of::<Sums>() + settings.effective_replicates() as usize * size_of::<Replicate>();
+    (size_of::<Pixel>() + if settings.error.is_some() { sums } else { 0 }) as u64
+}
+
 impl Tile {
     /// The tiles of a picture, row by row.
     pub(super) fn all(scene: &Prepared) -> Vec<Self> {
@@ -89,14 +95,7 @@ impl Tile {
             y0,
             width: SIDE.min(width - x0),
             height: SIDE.min(height - y0),
-            samples: 0,
-            is_finished: false,
-            rays: 0,
-            bad_count: 0,
-            bad: Vec::new(),
-            sums: Vec::new(),
-            replicates: Vec::new(),
-            pixels: Vec::new(),
+            ..Self::default()
         };
         starts(height).flat_map(|y0| starts(width).map(move |x0| (x0, y0))).map(|(x, y)| tile(x, y)).collect()
     }
@@ -106,65 +105,50 @@ impl Tile {
         u64::from(self.width) * u64::from(self.height)
     }
 
-    /// Goes on, unless it is finished, until each pixel has `samples` of them, and judges whether that is enough.
-    pub(super) fn sample_up_to(
-        &mut self,
-        scene: &Prepared,
-        samples: u32,
-        lit: &LightImage,
-        control: &Control,
-    ) -> Result<(), RenderError> {
-        if self.is_finished {
-            return Ok(());
-        }
-        let replicates = scene.settings.effective_replicates() as usize;
+    /// Makes room for the sums of its pixels.
+    pub(super) fn begin(&mut self, settings: &RenderSettings) {
         let area = self.area() as usize;
         self.sums.resize(area, Sums::default());
-        self.replicates.resize(area * replicates, Replicate::default());
-        for pixel in 0..area {
-            if control.stop.load(Ordering::Relaxed) {
-                return Err(RenderError::Cancelled);
-            }
-            self.sample_pixel(scene, pixel, samples, replicates);
-            control.paths.fetch_add(u64::from(samples - self.samples), Ordering::Relaxed);
-        }
-        self.samples = samples;
-        let is_good = |goal: f32| samples >= FEWEST_JUDGED && self.error(lit) <= f64::from(goal);
-        self.is_finished = samples == scene.settings.spp || scene.settings.error.is_some_and(is_good);
-        if self.is_finished {
-            let spared = u64::from(scene.settings.spp - samples) * self.area();
-            control.paths.fetch_add(spared, Ordering::Relaxed);
-            self.settle(lit);
-        }
-        Ok(())
+        self.replicates.resize(area * settings.effective_replicates() as usize, Replicate::default());
     }
 
-    fn sample_pixel(&mut self, scene: &Prepared, pixel: usize, samples: u32, replicates: usize) {
-        let (x, y) = self.place(pixel);
-        let mut sums = self.sums[pixel];
-        let sets = &mut self.replicates[pixel * replicates..][..replicates];
-        for sample in self.samples..samples {
-            let path = sample_pixel(scene, x, y, sample, |_| ());
-            self.rays += path.rays;
-            let r = path.radiance;
-            if !r.is_finite() || r.r < 0.0 || r.g < 0.0 || r.b < 0.0 {
-                self.bad_count += 1;
-                if self.bad.len() < NAMED_BAD_SAMPLES {
-                    self.bad.push(BadSample { x, y, sample });
-                }
-                continue;
+    /// Adds sample `sample` of a pixel.
+    #[inline]
+    pub(super) fn add(&mut self, pixel: usize, sample: u32, path: &PathSample) {
+        self.rays += path.rays;
+        let r = path.radiance;
+        if !r.is_finite() || r.r < 0.0 || r.g < 0.0 || r.b < 0.0 {
+            self.bad_count += 1;
+            if self.bad.len() < NAMED_BAD_SAMPLES {
+                let (x, y) = self.place(pixel);
+                self.bad.push(BadSample { x, y, sample });
             }
-            let set = &mut sets[sample as usize % replicates];
-            set.radiance += r.cast();
-            set.count += 1;
-            if let Some(first) = path.first {
-                sums.albedo += first.albedo.cast();
-                sums.normal += first.normal.as_dvec3();
-                sums.depth += f64::from(first.depth);
-                sums.hits += 1;
-            }
+            return;
         }
-        self.sums[pixel] = sums;
+        let replicates = self.replicates.len() / self.sums.len();
+        let set = &mut self.replicates[pixel * replicates + sample as usize % replicates];
+        set.radiance += r.cast();
+        set.count += 1;
+        if let Some(first) = path.first {
+            let sums = &mut self.sums[pixel];
+            sums.albedo += first.albedo.cast();
+            sums.normal += first.normal.as_dvec3();
+            sums.depth += f64::from(first.depth);
+            sums.hits += 1;
+        }
+    }
+
+    /// Each pixel has got `samples` of them: judges whether that is enough. The result is how many more the settings would have allowed
+    /// all pixels together.
+    pub(super) fn end(&mut self, settings: &RenderSettings, samples: u32, lit: &LightImage) -> u64 {
+        self.samples = samples;
+        let is_good = |goal: f32| samples >= FEWEST_JUDGED && self.error(lit) <= f64::from(goal);
+        self.is_finished = samples == settings.spp || settings.error.is_some_and(is_good);
+        if !self.is_finished {
+            return 0;
+        }
+        self.settle(lit);
+        u64::from(settings.spp - samples) * self.area()
     }
 
     /// Columns and rows of its pixels.
@@ -172,7 +156,7 @@ impl Tile {
         (0..self.area() as usize).map(|pixel| self.place(pixel))
     }
 
-    fn place(&self, pixel: usize) -> (u32, u32) {
+    pub(super) fn place(&self, pixel: usize) -> (u32, u32) {
         let pixel = pixel as u32;
         (self.x0 + pixel % self.width, self.y0 + pixel / self.width)
     }

@@ -5,6 +5,7 @@ mod open;
 mod present;
 mod run;
 mod scenes;
+mod work;
 
 use std::path::PathBuf;
 

@@ -1,16 +1,18 @@
 //! Doing the jobs of a sweep.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::scenes::Scenes;
+use super::work::Work;
 use super::{Sweep, SweepError, SweepResult, present};
 use crate::compare::{Limits, StrictLimits, Thresholds, find_idiff};
 use crate::imagefile;
-use crate::job::{self, Build, Destination, LoadedScene, References};
+use crate::job::{self, Build, Destination, References};
 use crate::manifest::{self, CompareSpec};
-use crate::record::{Job, JobRecord, Outcome};
+use crate::record::{Job, JobRecord};
 use crate::render::Control;
 
 /// How a sweep is run.
@@ -24,6 +26,8 @@ pub struct Options {
     pub fail_fast: bool,
     /// Only a part of the jobs.
     pub shard: Option<Shard>,
+    /// The most jobs that are rendered together; few enough that a killed run loses little where absent.
+    pub together: Option<NonZeroUsize>,
     /// The real `idiff`; looked for where absent.
     pub idiff: Option<PathBuf>,
 }
@@ -49,8 +53,8 @@ impl Shard {
 
 /// Somebody who watches a sweep.
 pub trait Observer {
-    /// A job is about to be rendered; `control` tells how far it is.
-    fn started(&mut self, job: &Job, control: &Arc<Control>);
+    /// Some jobs, at least one, are about to be rendered together; `control` tells how far they are.
+    fn started(&mut self, jobs: &[&Job], control: &Arc<Control>);
     /// A job is done, failed, or was found finished.
     fn finished(&mut self, record: &JobRecord, reused: bool);
     /// A job belongs to another shard.
@@ -62,12 +66,12 @@ pub trait Observer {
 pub struct Silent;
 
 impl Observer for Silent {
-    fn started(&mut self, _: &Job, _: &Arc<Control>) {}
+    fn started(&mut self, _: &[&Job], _: &Arc<Control>) {}
     fn finished(&mut self, _: &JobRecord, _: bool) {}
     fn left_out(&mut self, _: &Job) {}
 }
 
-/// Runs a sweep: every path of the manifest is checked against every scene first; then job after job is rendered or reused,
+/// Runs a sweep: every path of the manifest is checked against every scene first; then jobs are rendered, together where they can be, or reused,
 /// and at last the sheet and the page are made of what is there.
 ///
 /// # Errors
@@ -85,32 +89,25 @@ pub fn run(sweep: &Sweep, options: &Options, observer: &mut dyn Observer) -> Res
     let mut scenes = Scenes::of(sweep);
     check_with(sweep, &mut scenes)?;
 
-    let mut records: Vec<(usize, JobRecord)> = Vec::new();
-    let mut reused = 0;
     let wanted = options.shard.map(|shard| shard.names(&sweep.jobs));
-    for (index, job, reading) in scenes.scene_by_scene(&sweep.jobs)? {
+    let mut work = Work::new(&build, &destination, options, observer);
+    let mut last = None;
+    for (index, job, reading) in scenes.in_order(&sweep.jobs)? {
         if wanted.as_ref().is_some_and(|names| !names.contains(job.name.as_str())) {
-            observer.left_out(job);
+            work.observer.left_out(job);
             continue;
         }
-        match run_job(job, scenes.get(&reading), &build, &destination, options, observer)? {
-            Turn::Reused(record) => {
-                reused += 1;
-                observer.finished(&record, true);
-                records.push((index, record));
-            }
-            Turn::Done(record) => {
-                observer.finished(&record, false);
-                let failed = matches!(record.outcome, Outcome::Failed { .. });
-                records.push((index, record));
-                if failed && options.fail_fast {
-                    break;
-                }
-            }
+        // Two scenes need not be in memory at once.
+        if last.as_ref() != Some(&reading) {
+            work.render_waiting()?;
         }
+        work.take(index, job, scenes.get(&reading))?;
+        if work.is_over() {
+            break;
+        }
+        last = Some(reading);
     }
-    records.sort_by_key(|(index, _)| *index);
-    let records: Vec<JobRecord> = records.into_iter().map(|(_, record)| record).collect();
+    let (records, reused) = work.end()?;
     let presentation = present::present(sweep, &records, reused, &destination.folder);
     Ok(SweepResult { records, reused, presentation })
 }
@@ -132,40 +129,6 @@ fn check_with(sweep: &Sweep, scenes: &mut Scenes) -> Result<Vec<String>, SweepEr
         }
     }
     Ok(unreadable)
-}
-
-enum Turn {
-    Reused(JobRecord),
-    Done(JobRecord),
-}
-
-fn run_job(
-    job: &Job,
-    loaded: Result<&LoadedScene, String>,
-    build: &Build,
-    destination: &Destination,
-    options: &Options,
-    observer: &mut dyn Observer,
-) -> Result<Turn, SweepError> {
-    let planned = loaded.and_then(|loaded| {
-        let planned = job::plan(job, loaded, build).map_err(|error| error.to_string())?;
-        Ok((planned, loaded))
-    });
-    let (planned, loaded) = match planned {
-        Ok(pair) => pair,
-        Err(error) => {
-            return Ok(Turn::Done(job::failed_record(job, build, &destination.folder, &error)?));
-        }
-    };
-    if !options.force
-        && let Some(mut record) = job::finished(&planned, &destination.folder)
-    {
-        job::recheck(&mut record, destination)?;
-        return Ok(Turn::Reused(record));
-    }
-    let control = Arc::new(Control::default());
-    observer.started(job, &control);
-    Ok(Turn::Done(job::run(&planned, loaded, build, destination, &control)?))
 }
 
 /// The folder of results and those that job names lead into, without what a killed run left half written.

@@ -7,7 +7,8 @@ use crate::convert::ConvertOptions;
 use crate::import::ImportOptions;
 use crate::job::{self, LoadedScene};
 use crate::manifest::edit;
-use crate::record::Job;
+use crate::record::{Job, Override};
+use crate::settings::RenderSettings;
 
 /// A scene's file and how it is read: what jobs share that need the same scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +17,20 @@ pub struct Reading {
     pub path: PathBuf,
     import: ImportOptions,
     convert: ConvertOptions,
+}
+
+/// What jobs that differ in materials alone have in common.
+#[derive(PartialEq)]
+struct View<'j> {
+    settings: &'j RenderSettings,
+    overrides: Vec<&'j Override>,
+}
+
+impl<'j> View<'j> {
+    fn of(job: &'j Job) -> Self {
+        let overrides = job.overrides.iter().filter(|o| !o.path.starts_with("material.")).collect();
+        Self { settings: &job.settings, overrides }
+    }
 }
 
 /// Loaded scenes: only the last one is kept, since jobs come scene by scene, but every failure.
@@ -62,19 +77,27 @@ impl Scenes {
         Ok(readings)
     }
 
-    /// The jobs with their places and what they need, those of one scene together, so that each scene is loaded once.
+    /// The jobs with their places and what they need: those of one scene together, so that each scene is loaded once, and among them those
+    /// that differ in materials alone, so that they can be rendered together.
     ///
     /// # Errors
     /// As [`Self::reading`].
-    pub fn scene_by_scene<'j>(
-        &self,
-        jobs: &'j [Job],
-    ) -> Result<Vec<(usize, &'j Job, Reading)>, edit::EditError> {
+    pub fn in_order<'j>(&self, jobs: &'j [Job]) -> Result<Vec<(usize, &'j Job, Reading)>, edit::EditError> {
         let readings = self.readings(jobs)?;
-        let with_reading = |(index, job)| Ok((index, job, self.reading(job)?));
-        let mut ordered: Vec<_> = jobs.iter().enumerate().map(with_reading).collect::<Result<_, _>>()?;
-        ordered.sort_by_key(|(_, _, wanted)| readings.iter().position(|reading| reading == wanted));
-        Ok(ordered)
+        let mut views: Vec<View<'_>> = Vec::new();
+        let mut ordered = Vec::with_capacity(jobs.len());
+        for (index, job) in jobs.iter().enumerate() {
+            let reading = self.reading(job)?;
+            let of_reading = readings.iter().position(|known| *known == reading);
+            let view = View::of(job);
+            let of_view = views.iter().position(|known| *known == view).unwrap_or_else(|| {
+                views.push(view);
+                views.len() - 1
+            });
+            ordered.push(((of_reading, of_view), (index, job, reading)));
+        }
+        ordered.sort_by_key(|(place, _)| *place);
+        Ok(ordered.into_iter().map(|(_, job)| job).collect())
     }
 
     /// The scene.

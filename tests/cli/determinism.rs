@@ -32,6 +32,19 @@ fn a_job_alone_has_the_pixels_it_has_in_a_sweep() {
 }
 
 #[test]
+fn jobs_rendered_together_write_the_bytes_that_they_write_one_by_one() {
+    let together = Desk::with_three_jobs("");
+    let alone = Desk::with_three_jobs("");
+    together.sweep(&[]).ends_with(0);
+    alone.sweep(&["--together", "1"]).ends_with(0);
+    assert_eq!(together.images().len(), 3);
+    assert!(together.image_bytes() == alone.image_bytes());
+    let says_so =
+        |desk: &Desk| desk.record("roughness=0.10").skipped.iter().any(|skip| skip.contains("% of the rays"));
+    assert!(says_so(&together) && !says_so(&alone));
+}
+
+#[test]
 fn shards_split_the_jobs_and_come_together_to_the_whole() {
     let whole = Desk::with_three_jobs("");
     whole.sweep(&[]).ends_with(0);

@@ -22,7 +22,7 @@ fn desk(spp: u32) -> Desk {
 /// Starts a sweep, kills it as soon as a record is there, and tells which jobs were done then.
 fn killed(desk: &Desk) -> BTreeMap<String, Seen> {
     let mut child = Command::new(PROGRAM)
-        .args(["sweep", "sweep.toml", "--threads", "1"])
+        .args(["sweep", "sweep.toml", "--threads", "1", "--together", "2"])
         .current_dir(desk.path("."))
         .stdout(Stdio::null())
         .stderr(Stdio::null())

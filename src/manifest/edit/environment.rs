@@ -70,14 +70,14 @@ pub(super) fn set_image<M>(
         _ => Equirectangular::YUp,
     };
     let id = ImageId(scene.images.len() as u32);
-    scene.images.push(Arc::new(image));
+    scene.images.push(image);
     let before = scene.environment.take().unwrap_or_else(|| Environment::constant(Rgb::WHITE));
     scene.environment = Some(Environment { map: EnvironmentMap::Image { image: id, mapping }, ..before });
     Ok(())
 }
 
 /// Linear floats without negative values; 8 and 16 bits are decoded as sRGB.
-fn radiance(image: Image, file: &Path) -> Result<Image, EditError> {
+fn radiance(image: Arc<Image>, file: &Path) -> Result<Arc<Image>, EditError> {
     let expected =
         (image.width as usize).saturating_mul(image.height as usize).saturating_mul(image.channels.into());
     let found = match &image.pixels {
@@ -89,24 +89,24 @@ fn radiance(image: Image, file: &Path) -> Result<Image, EditError> {
     if found != expected || found == 0 || !(1..=4).contains(&image.channels) {
         return Err(EditError::ImageSize { file: file.to_owned(), found, expected });
     }
-    let Image { name, width, height, channels, pixels } = image;
-    match pixels {
-        Pixels::F32(mut values) => {
-            if !values.iter().all(|v| v.is_finite()) {
-                return Err(EditError::ImageNotFinite { file: file.to_owned() });
+    let Pixels::F32(values) = &image.pixels else {
+        let (width, height) = (image.width, image.height);
+        let mut values = Vec::with_capacity(width as usize * height as usize * 3);
+        for y in 0..height {
+            for x in 0..width {
+                values.extend(image.texel(x, y, Encoding::Srgb).color.to_array());
             }
-            values.iter_mut().for_each(|v| *v = v.max(0.0));
-            Ok(Image { name, width, height, channels, pixels: Pixels::F32(values) })
         }
-        pixels => {
-            let encoded = Image { name, width, height, channels, pixels };
-            let mut values = Vec::with_capacity(width as usize * height as usize * 3);
-            for y in 0..height {
-                for x in 0..width {
-                    values.extend(encoded.texel(x, y, Encoding::Srgb).color.to_array());
-                }
-            }
-            Ok(Image { channels: 3, pixels: Pixels::F32(values), ..encoded })
-        }
+        let name = image.name.clone();
+        return Ok(Arc::new(Image { name, width, height, channels: 3, pixels: Pixels::F32(values) }));
+    };
+    if !values.iter().all(|v| v.is_finite()) {
+        return Err(EditError::ImageNotFinite { file: file.to_owned() });
     }
+    if values.iter().all(|v| *v >= 0.0) {
+        return Ok(image);
+    }
+    let values = values.iter().map(|v| v.max(0.0)).collect();
+    let Image { name, width, height, channels, .. } = (*image).clone();
+    Ok(Arc::new(Image { name, width, height, channels, pixels: Pixels::F32(values) }))
 }

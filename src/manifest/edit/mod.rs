@@ -26,6 +26,7 @@ mod tests;
 mod value;
 
 use std::path::Path;
+use std::sync::Arc;
 
 pub use error::{BoxedError, EditError, Half};
 pub use field::{
@@ -47,8 +48,8 @@ use crate::settings::{ConvertOptions, ImportOptions, RenderSettings};
 /// The largest whole number that a value holds exactly: 2^53.
 pub const MAX_WHOLE: u64 = render::MAX_WHOLE;
 
-/// Reads the image file that an override names.
-pub type ImageLoader<'a> = dyn FnMut(&Path) -> Result<Image, BoxedError> + 'a;
+/// Reads the image file that an override names. Floats that are not negative are used as they are.
+pub type ImageLoader<'a> = dyn FnMut(&Path) -> Result<Arc<Image>, BoxedError> + 'a;
 
 impl Target {
     /// What the path takes, with range and unit.

@@ -63,12 +63,12 @@ fn edited(edits: &[(&str, Value)]) -> Result<(Scene<Material>, RenderSettings), 
     let mut settings = RenderSettings::default();
     let overrides: Vec<_> =
         edits.iter().map(|(path, value)| Override { path: (*path).into(), value: value.clone() }).collect();
-    let mut load = |file: &Path| -> Result<Image, BoxedError> {
+    let mut load = |file: &Path| -> Result<Arc<Image>, BoxedError> {
         if file == Path::new("missing.hdr") {
             return Err("no such file".into());
         }
         let pixels = Pixels::F32(vec![1.0, -2.0, 3.0, 4.0, 5.0, 6.0]);
-        Ok(Image { name: file.display().to_string(), width: 2, height: 1, channels: 3, pixels })
+        Ok(Arc::new(Image { name: file.display().to_string(), width: 2, height: 1, channels: 3, pixels }))
     };
     apply_all(&mut scene, &mut settings, &overrides, &mut load)?;
     Ok((scene, settings))
@@ -92,7 +92,7 @@ fn a_constant_takes_the_place_of_a_texture() {
     let mut scene = scene();
     let map = TextureMap::new(TextureId(0), TextureChannel::G);
     *scene.materials[0].item.scalar_mut(Parameter::Roughness) = Param::Texture { map, factor: 1.0 };
-    let mut none = |_: &Path| -> Result<Image, BoxedError> { Err("unused".into()) };
+    let mut none = |_: &Path| -> Result<Arc<Image>, BoxedError> { Err("unused".into()) };
     let mut settings = RenderSettings::default();
     apply(&mut scene, &mut settings, "material.ball.roughness", &number(0.3), &mut none).unwrap();
     assert_eq!(scene.materials[0].item.scalar(Parameter::Roughness), &Param::Constant(0.3));
@@ -223,7 +223,7 @@ fn a_mirroring_camera_goes_on_mirroring_and_c2w_may_mirror() {
     assert!(mirrored.world_from_camera.matrix3.determinant() < 0.0);
     let mut scene = scene();
     scene.cameras[0].item = mirrored;
-    let mut none = |_: &Path| -> Result<Image, BoxedError> { Err("unused".into()) };
+    let mut none = |_: &Path| -> Result<Arc<Image>, BoxedError> { Err("unused".into()) };
     let at = list(&[0.0, 0.0, 4.0]);
     apply(&mut scene, &mut RenderSettings::default(), "camera.position", &at, &mut none).unwrap();
     assert!(scene.cameras[0].item.world_from_camera.matrix3.determinant() < 0.0);
@@ -275,7 +275,7 @@ fn the_named_camera_is_the_one_that_changes() {
 fn a_position_makes_a_camera_where_there_is_none() {
     let mut bare = scene();
     bare.cameras.clear();
-    let mut none = |_: &Path| -> Result<Image, BoxedError> { Err("unused".into()) };
+    let mut none = |_: &Path| -> Result<Arc<Image>, BoxedError> { Err("unused".into()) };
     let mut settings = RenderSettings::default();
     let failed = apply(&mut bare, &mut settings, "camera.fov", &number(30.0), &mut none);
     assert!(matches!(failed, Err(EditError::NoCamera)));
@@ -325,8 +325,8 @@ fn an_environment_is_made_where_there_is_none() {
 
 /// Sets the environment's image to these pixels, 2 × 1.
 fn with_sky(scene: &mut Scene<Material>, channels: u8, pixels: Pixels) -> Result<(), EditError> {
-    let mut load = move |_: &Path| -> Result<Image, BoxedError> {
-        Ok(Image { name: "sky".into(), width: 2, height: 1, channels, pixels: pixels.clone() })
+    let mut load = move |_: &Path| -> Result<Arc<Image>, BoxedError> {
+        Ok(Arc::new(Image { name: "sky".into(), width: 2, height: 1, channels, pixels: pixels.clone() }))
     };
     apply(scene, &mut RenderSettings::default(), "environment.image", &text("sky"), &mut load)
 }
@@ -360,7 +360,7 @@ fn another_image_keeps_the_mapping_of_the_first() {
 fn a_z_up_scene_is_orbited_about_z() {
     let mut scene = scene();
     scene.cameras[0].item = Camera::look_at(Vec3::new(0.0, -4.0, 1.0), Vec3::Z, Vec3::Z, 0.7);
-    let mut none = |_: &Path| -> Result<Image, BoxedError> { Err("unused".into()) };
+    let mut none = |_: &Path| -> Result<Arc<Image>, BoxedError> { Err("unused".into()) };
     let mut settings = RenderSettings::default();
     for (azimuth, expected) in [(0.0, Vec3::new(0.0, -4.0, 1.0)), (90.0, Vec3::new(4.0, 0.0, 1.0))] {
         let overrides = [

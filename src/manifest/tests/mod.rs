@@ -118,7 +118,8 @@ fn the_statue_has_four_zipped_materials() {
     scene.materials[0].name = "statue".into();
     check(&manifest, &scene, Path::new("statue.glb.gz")).unwrap();
     let mut settings = jobs[3].settings.clone();
-    let mut none = |_: &Path| -> Result<crate::scene::Image, edit::BoxedError> { Err("unused".into()) };
+    let mut none =
+        |_: &Path| -> Result<std::sync::Arc<crate::scene::Image>, edit::BoxedError> { Err("unused".into()) };
     edit::apply_all(&mut scene, &mut settings, &jobs[3].overrides, &mut none).unwrap();
     let bunny = &scene.materials[0].item;
     assert_eq!(bunny.scalar(Parameter::SheenTint).constant(), Some(0.9));

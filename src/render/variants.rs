@@ -1,0 +1,135 @@
+//! One geometry, many materials: jobs of a sweep whose paths are the same up to the first surface whose material differs.
+//!
+//! A sample's random numbers belong to its vertices, lights are chosen without regard to materials, and what casts shadows casts them in
+//! all variants alike: so a path that has met none of the differing materials yet is the same in all of them, to the last bit. It is
+//! traced once to there, and then once more for each variant.
+
+use std::sync::Arc;
+
+use super::Prepared;
+use super::film::{camera_sample, sample_pixel};
+use super::light_image;
+use super::path::{PathSample, Walk, Walked};
+use super::tile;
+use crate::settings::Integrator;
+
+/// Most variants at once: of what the first of them share, little is left to save.
+const MOST: usize = 16;
+/// Memory for the pixels of all, in bytes.
+const MOST_MEMORY: u64 = 1 << 31;
+
+/// Scenes that differ in materials alone.
+#[derive(Clone, Debug)]
+pub struct Variants<'a> {
+    scenes: Vec<&'a Prepared>,
+    /// The materials, by index, that are not the same in all scenes.
+    differing: Vec<bool>,
+}
+
+impl<'a> Variants<'a> {
+    /// A scene without another.
+    pub fn alone(scene: &'a Prepared) -> Self {
+        Self { scenes: vec![scene], differing: vec![false; scene.materials.len()] }
+    }
+
+    /// Takes in as many of `scenes` as follow the first one and are variants of it.
+    ///
+    /// None of the materials that differ may emit light or let shadow rays pass, and everything else must be the same: geometry,
+    /// textures, lights, camera and settings; light paths start in all or none. There are at most 16, and at most as many as two
+    /// gigabytes hold the pixels of.
+    pub fn leading(scenes: impl IntoIterator<Item = &'a Prepared>) -> Option<Self> {
+        let mut scenes = scenes.into_iter();
+        let mut variants = Self::alone(scenes.next()?);
+        for scene in scenes {
+            if !variants.admit(scene) {
+                break;
+            }
+        }
+        Some(variants)
+    }
+
+    /// The scenes.
+    pub fn scenes(&self) -> &[&'a Prepared] {
+        &self.scenes
+    }
+
+    /// Takes a scene in if it is a variant of those that are here.
+    fn admit(&mut self, scene: &'a Prepared) -> bool {
+        let first = self.scenes[0];
+        if self.scenes.len() >= self.room() || !differ_in_materials_alone(first, scene) {
+            return false;
+        }
+        let materials = first.scene.materials.iter().zip(&scene.scene.materials);
+        let differing: Vec<bool> =
+            materials.zip(&self.differing).map(|((a, b), &differs)| differs || a.item != b.item).collect();
+        let is_plain = |scene: &Prepared| {
+            let differing = scene.materials.iter().zip(&differing).filter(|(_, differs)| **differs);
+            differing
+                .into_iter()
+                .all(|(m, _)| m.blocks_shadow_rays() && m.mean_emission(&scene.scene).is_none())
+        };
+        let fits = self.scenes.iter().copied().chain([scene]).all(is_plain);
+        if fits {
+            self.differing = differing;
+            self.scenes.push(scene);
+        }
+        fits
+    }
+
+    /// How many there may be.
+    fn room(&self) -> usize {
+        let first = self.scenes[0];
+        let (width, height) = first.size();
+        let bytes = u64::from(width)
+            * u64::from(height)
+            * (tile::bytes_a_pixel(&first.settings) + light_image::bytes_a_pixel(first));
+        usize::try_from(MOST_MEMORY / bytes.max(1)).unwrap_or(MOST).clamp(1, MOST)
+    }
+
+    /// Takes a sample of a pixel of the variants that are `going` on, at least one, and gives each one's to `found`, with the number of
+    /// rays that others share.
+    #[inline]
+    pub(super) fn sample(
+        &self,
+        going: &[usize],
+        (x, y): (u32, u32),
+        sample: u32,
+        mut found: impl FnMut(usize, &PathSample, u64),
+    ) {
+        let first = self.scenes[going[0]];
+        if going.len() == 1 {
+            return found(going[0], &sample_pixel(first, x, y, sample, |_| ()), 0);
+        }
+        let (sampler, ray) = camera_sample(first, x, y, sample);
+        let differs = |triangle| self.differing[first.material_index(triangle)];
+        match Walk::new(first, ray).go_on(first, &sampler, None, |hit| differs(hit.triangle), |_| ()) {
+            Walked::Over(path) => going.iter().for_each(|&variant| found(variant, &path, path.rays)),
+            Walked::Before(walk, hit) => {
+                for &variant in going {
+                    found(variant, &walk.finish(self.scenes[variant], &sampler, hit), walk.rays());
+                }
+            }
+        }
+    }
+}
+
+/// Whether the scenes' paths are the same up to where their materials differ, provided that these do not emit, cover and shade
+/// differently.
+fn differ_in_materials_alone(a: &Prepared, b: &Prepared) -> bool {
+    let (from, to) = (&a.scene, &b.scene);
+    let has_same_images = from.images.len() == to.images.len()
+        && from.images.iter().zip(&to.images).all(|(a, b)| Arc::ptr_eq(a, b));
+    Arc::ptr_eq(&a.geometry, &b.geometry)
+        && a.settings == b.settings
+        && a.settings.integrator == Integrator::Path
+        && a.techniques == b.techniques
+        && a.light_paths.is_ok() == b.light_paths.is_ok()
+        && a.camera_medium == b.camera_medium
+        && from.materials.len() == to.materials.len()
+        && from.instances == to.instances
+        && from.textures == to.textures
+        && has_same_images
+        && from.cameras == to.cameras
+        && from.lights == to.lights
+        && from.environment == to.environment
+}

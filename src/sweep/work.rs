@@ -1,0 +1,126 @@
+//! A sweep under way: jobs that can be rendered together wait for each other.
+
+use std::sync::Arc;
+
+use super::SweepError;
+use super::run::{Observer, Options};
+use crate::job::{self, Build, Destination, LoadedScene, Ready};
+use crate::record::{Job, JobRecord, Outcome};
+use crate::render::Control;
+
+/// Unless asked for more, jobs are rendered together as long as they take no more camera paths than this: some minutes' work, which is
+/// what a killed run loses.
+const MOST_PATHS: u64 = 1 << 29;
+
+/// What is done and what waits.
+pub(super) struct Work<'a> {
+    build: &'a Build,
+    destination: &'a Destination,
+    options: &'a Options,
+    pub(super) observer: &'a mut dyn Observer,
+    /// Jobs with their places, to be rendered together.
+    waiting: Vec<(usize, Ready)>,
+    records: Vec<(usize, JobRecord)>,
+    reused: usize,
+}
+
+impl<'a> Work<'a> {
+    pub(super) fn new(
+        build: &'a Build,
+        destination: &'a Destination,
+        options: &'a Options,
+        observer: &'a mut dyn Observer,
+    ) -> Self {
+        Self { build, destination, options, observer, waiting: Vec::new(), records: Vec::new(), reused: 0 }
+    }
+
+    /// Reuses a job, or lets it wait for others that can be rendered with it; those that can't are rendered first.
+    pub(super) fn take(
+        &mut self,
+        index: usize,
+        job: &Job,
+        loaded: Result<&LoadedScene, String>,
+    ) -> Result<(), SweepError> {
+        let planned = loaded.and_then(|loaded| {
+            let planned = job::plan(job, loaded, self.build).map_err(|error| error.to_string())?;
+            Ok((planned, loaded))
+        });
+        let (planned, loaded) = match planned {
+            Ok(pair) => pair,
+            Err(error) => {
+                self.render_waiting()?;
+                let record = job::failed_record(job, self.build, &self.destination.folder, &error)?;
+                self.add(index, record, false);
+                return Ok(());
+            }
+        };
+        if !self.options.force
+            && let Some(mut record) = job::finished(&planned, &self.destination.folder)
+        {
+            job::recheck(&mut record, self.destination)?;
+            self.add(index, record, true);
+            return Ok(());
+        }
+        match job::prepare(planned, loaded, self.build, self.destination) {
+            Ok(ready) => {
+                if !self.has_room_for(&ready) {
+                    self.render_waiting()?;
+                }
+                self.waiting.push((index, ready));
+            }
+            Err(record) => {
+                self.render_waiting()?;
+                job::keep_record(&record, self.destination)?;
+                self.add(index, *record, false);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a job can be rendered with those that wait.
+    fn has_room_for(&self, ready: &Ready) -> bool {
+        let count = self.waiting.len() + 1;
+        let is_short = match self.options.together {
+            Some(most) => count <= most.get(),
+            None => ready.paths().saturating_mul(count as u64) <= MOST_PATHS,
+        };
+        let waiting: Vec<&Ready> = self.waiting.iter().map(|(_, ready)| ready).collect();
+        is_short && ready.joins(&waiting)
+    }
+
+    /// Renders the jobs that wait.
+    pub(super) fn render_waiting(&mut self) -> Result<(), SweepError> {
+        let waiting = std::mem::take(&mut self.waiting);
+        if waiting.is_empty() || self.is_over() {
+            return Ok(());
+        }
+        let ready: Vec<&Ready> = waiting.iter().map(|(_, ready)| ready).collect();
+        let jobs: Vec<&Job> = ready.iter().map(|ready| ready.job()).collect();
+        let control = Arc::new(Control::default());
+        self.observer.started(&jobs, &control);
+        let records = job::run_together(&ready, self.build, self.destination, &control)?;
+        for ((index, _), record) in waiting.iter().zip(records) {
+            self.add(*index, record, false);
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, index: usize, record: JobRecord, reused: bool) {
+        self.observer.finished(&record, reused);
+        self.reused += usize::from(reused);
+        self.records.push((index, record));
+    }
+
+    /// A job has failed, and that was to end the sweep.
+    pub(super) fn is_over(&self) -> bool {
+        let has_failed = |(_, record): &(usize, JobRecord)| matches!(record.outcome, Outcome::Failed { .. });
+        self.options.fail_fast && self.records.iter().any(has_failed)
+    }
+
+    /// Renders what still waits; the result is all records in the order of the jobs, and how many were reused.
+    pub(super) fn end(mut self) -> Result<(Vec<JobRecord>, usize), SweepError> {
+        self.render_waiting()?;
+        self.records.sort_by_key(|(index, _)| *index);
+        Ok((self.records.into_iter().map(|(_, record)| record).collect(), self.reused))
+    }
+}
