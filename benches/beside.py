@@ -3,7 +3,7 @@
 Each renderer is held against a long render of its own, as `pipeline bench` does: the error is the mean over pixels and channels of
 (x - ref)²/(ref² + 0.01), and work is error × seconds of rendering, without loading the scene and building its BVH. Materials are
 similar, not equal, so the ratio of work tells how efficient a renderer is on such a scene. *Mean* is that of the reference: where two
-differ by more than a fifth the scene is lit differently, and the ratio means nothing; --pictures shows why.
+differ by more than a fifth the scene is lit differently, and no ratio is given; --pictures shows the two.
 """
 
 import argparse
@@ -19,6 +19,8 @@ import OpenImageIO
 
 PIPELINE = pathlib.Path(__file__).parent.parent / "target/release/pipeline"
 REFERENCE_SEED = 1 << 20
+# How far the mean of the other's reference may be off ours, as a part of it.
+ALIKE = 0.2
 
 
 class LeftOut(Exception):
@@ -69,8 +71,9 @@ def compare(peer, options, load):
                 print(f"{name:<20} left out: {reason}", flush=True)
                 continue
             peer_error, peer_seconds, peer_reference = _measure(render, options)
-        work, peer_work = error * seconds, peer_error * peer_seconds
-        print(f"{_row(name, 'ours', error, seconds, reference)}  {work / peer_work:.3f}")
+        alike = abs(peer_reference.mean() / reference.mean() - 1) <= ALIKE
+        verdict = f"{error * seconds / (peer_error * peer_seconds):.3f}" if alike else "lit differently"
+        print(f"{_row(name, 'ours', error, seconds, reference)}  {verdict}")
         print(_row("", peer, peer_error, peer_seconds, peer_reference), flush=True)
         if options.pictures:
             _show(options.pictures / f"{name}.png", numpy.hstack([reference, peer_reference]))

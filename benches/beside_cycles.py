@@ -33,7 +33,10 @@ def load(options, scene, folder, size):
     # Lights as they are, in W/sr, not by lumens.
     bpy.ops.import_scene.gltf(filepath=str(folder / "scene.glb"), export_import_convert_lighting_mode="COMPAT")
     blender = bpy.context.scene
-    blender.camera = next(thing for thing in bpy.data.objects if thing.type == "CAMERA")
+    cameras = [thing for thing in bpy.data.objects if thing.type == "CAMERA"]
+    if len(cameras) != 1:
+        raise beside.LeftOut(f"it has {len(cameras)} cameras, and the one that {beside.PIPELINE.name} takes is not known here")
+    [blender.camera] = cameras
     for material in bpy.data.materials:
         if material.use_backface_culling:
             emit_in_front(material)
