@@ -7,6 +7,7 @@ use glam::Vec3;
 use pipeline::color::Rgb;
 use pipeline::scene::environment::Environment;
 use pipeline::scene::{Camera, Scene};
+use pipeline::settings::RenderSettings;
 
 fn test_scene() -> Scene {
     let camera = Camera::look_at(Vec3::new(1.0, 1.5, 4.0), Vec3::Y * 0.5, Vec3::Y, 0.6);
@@ -58,14 +59,13 @@ fn a_longer_render_begins_with_the_shorter_one_s_samples() {
     }
 }
 
-/// The variance layer, pooled over the image, against the spread of the pixel over 64 seeds.
-#[test]
-fn variance_layer_is_the_spread_over_seeds() {
+/// The variance layer's mean and the spread of the pixels over 64 seeds, both pooled over the image.
+fn claimed_and_spread(replicates: u32) -> (f64, f64) {
     let world = test_scene();
-    let mut settings = small(24, 18, 16, 6);
+    let mut settings = RenderSettings { replicates, ..small(24, 18, 16, 6) };
     let seeds = 64;
     let n = 24 * 18;
-    let (mut sum, mut square_sum, mut claimed) = (vec![0.0f64; n], vec![0.0f64; n], vec![0.0f64; n]);
+    let (mut sum, mut square_sum, mut claimed) = (vec![0.0f64; n], vec![0.0f64; n], 0.0);
     for seed in 0..seeds {
         settings.seed = seed;
         let rendered = render_scene(&world, &settings);
@@ -75,12 +75,33 @@ fn variance_layer_is_the_spread_over_seeds() {
         for i in 0..n {
             sum[i] += f64::from(g[i]);
             square_sum[i] += f64::from(g[i]) * f64::from(g[i]);
-            claimed[i] += f64::from(variance[i]) / seeds as f64;
+            claimed += f64::from(variance[i]) / seeds as f64;
         }
     }
-    let spread: f64 =
-        (0..n).map(|i| (square_sum[i] - sum[i] * sum[i] / seeds as f64) / (seeds - 1) as f64).sum();
-    let claimed: f64 = claimed.iter().sum();
+    let spread = (0..n).map(|i| (square_sum[i] - sum[i] * sum[i] / seeds as f64) / (seeds - 1) as f64).sum();
+    (claimed, spread)
+}
+
+#[test]
+fn variance_of_replicates_is_the_spread_over_seeds() {
+    let (claimed, spread) = claimed_and_spread(2);
     let ratio = claimed / spread;
     assert!((ratio - 1.0).abs() < 0.06, "claimed {claimed:e}, spread {spread:e}, ratio {ratio}");
+}
+
+/// The halves of one set complete each other: their spread is more than that of the whole, which is less than with two sets.
+#[test]
+fn a_single_replicate_makes_less_noise_and_tells_more() {
+    let (_, of_two) = claimed_and_spread(2);
+    let (claimed, spread) = claimed_and_spread(1);
+    assert!(spread < 0.95 * of_two, "one set {spread:e}, two {of_two:e}");
+    let ratio = claimed / spread;
+    assert!((1.0..1.6).contains(&ratio), "claimed {claimed:e}, spread {spread:e}, ratio {ratio}");
+}
+
+#[test]
+fn a_single_sample_tells_no_variance() {
+    let rendered = render_scene(&test_scene(), &small(8, 6, 1, 6));
+    let data = rendered.raster.layer("data").expect("data");
+    assert!(data.channel("variance.G").is_none() && data.channel("samples").is_some());
 }

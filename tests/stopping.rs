@@ -92,7 +92,7 @@ fn within(limit: Duration, settings: &RenderSettings) -> Rendered {
 fn time_that_is_over_at_once_leaves_no_hole() {
     let settings = small(64, 48, 1 << 20, 6);
     let samples = samples(&within(Duration::from_nanos(1), &settings));
-    assert!(samples.iter().all(|n| *n == settings.replicates as f32));
+    assert!(samples.iter().all(|n| *n == settings.parts() as f32));
 }
 
 #[test]

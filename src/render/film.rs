@@ -117,7 +117,7 @@ fn sample_up_to(
     let going: Vec<usize> = (0..tiles.len()).filter(|&variant| !tiles[variant].is_finished).collect();
     let Some(&any) = going.first() else { return Ok(()) };
     for &variant in &going {
-        tiles[variant].begin(settings);
+        tiles[variant].begin(settings, samples);
     }
     // They began together and go on together.
     let taken = tiles[any].samples;
@@ -210,8 +210,8 @@ fn layers(scene: &Prepared, pixels: &[Pixel]) -> Raster {
         .with("normal.Y", plane(&|p| p.normal.y))
         .with("normal.Z", plane(&|p| p.normal.z))
         .with("samples", plane(&|p| p.samples as f32));
-    // A single replicate has no spread to tell a variance from.
-    if scene.settings.effective_replicates() > 1 {
+    // A single sample has no spread to tell a variance from.
+    if scene.settings.parts() > 1 {
         data = data
             .with("variance.R", plane(&|p| p.variance.r))
             .with("variance.G", plane(&|p| p.variance.g))

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::film::Control;
 use super::light_path;
+use super::tile::second_half;
 use super::{Prepared, RenderError};
 use crate::color::Rgb;
 use crate::math::hash::mix64;
@@ -38,6 +39,8 @@ pub(super) struct LightImage {
     pub(super) bad_count: u64,
     /// By pixel, row by row, all replicates of a pixel together; empty without light paths.
     sums: Vec<Rgb<f64>>,
+    /// The first half of a single replicate: its paths and the sums that there were then.
+    first_half: Option<(u64, Vec<Rgb<f64>>)>,
 }
 
 /// The paths of a batch.
@@ -50,8 +53,8 @@ struct Batch {
 
 /// Memory for the sums of a pixel.
 pub(super) fn bytes_a_pixel(scene: &Prepared) -> u64 {
-    let replicates = if scene.light_paths.is_ok() { scene.settings.effective_replicates() } else { 0 };
-    u64::from(replicates) * size_of::<Rgb<f64>>() as u64
+    let parts = if scene.light_paths.is_ok() { scene.settings.parts() } else { 0 };
+    u64::from(parts) * size_of::<Rgb<f64>>() as u64
 }
 
 impl LightImage {
@@ -60,7 +63,7 @@ impl LightImage {
         let replicates = scene.settings.effective_replicates();
         let places = if scene.light_paths.is_ok() { width as usize * height as usize } else { 0 };
         let sums = vec![Rgb::BLACK; places * replicates as usize];
-        Self { width, replicates, paths: 0, rays: 0, bad_count: 0, sums }
+        Self { width, replicates, paths: 0, rays: 0, bad_count: 0, sums, first_half: None }
     }
 
     /// Goes on until there are as many light paths as belong to `samples` of each pixel.
@@ -73,8 +76,13 @@ impl LightImage {
         let Ok(plan) = &scene.light_paths else { return Ok(()) };
         let paths = plan.paths(samples);
         let round = BATCH * (BATCHES * rayon::current_num_threads()) as u64;
+        let half = scene.settings.is_halved().then(|| plan.paths(second_half(samples)));
         while self.paths < paths {
-            let end = paths.min(self.paths + round);
+            if half == Some(self.paths) {
+                self.first_half = Some((self.paths, self.sums.clone()));
+            }
+            let stop = half.filter(|&half| self.paths < half).unwrap_or(paths);
+            let end = stop.min(self.paths + round);
             let starts: Vec<u64> = (self.paths..end).step_by(BATCH as usize).collect();
             let batches: Vec<Batch> = starts
                 .into_par_iter()
@@ -127,16 +135,20 @@ impl LightImage {
         self.bad_count += batches.iter().map(|batch| batch.bad_count).sum::<u64>();
     }
 
-    /// The mean of each replicate at a pixel; none without light paths.
+    /// The mean of each part of the samples at a pixel; none without light paths.
     pub(super) fn pixel(&self, x: u32, y: u32) -> impl Iterator<Item = Rgb<f64>> + Clone {
         let replicates = self.replicates as usize;
         let first = (y as usize * self.width as usize + x as usize) * replicates;
         let sums = self.sums.get(first..first + replicates).unwrap_or_default();
+        let half = self.first_half.as_ref().map(|(paths, sums)| (*paths, sums[first]));
         let replicates = u64::from(self.replicates);
-        sums.iter().zip(0..).map(move |(&sum, replicate)| {
-            let paths = (self.paths + replicates - 1 - replicate) / replicates;
-            sum / paths.max(1) as f64
-        })
+        let of_replicate = move |(&sum, replicate): (&Rgb<f64>, u64)| match half {
+            None => (sum, (self.paths + replicates - 1 - replicate) / replicates),
+            Some((paths, of_half)) => (sum - of_half, self.paths - paths),
+        };
+        let of_half = half.map(|(paths, sum)| (sum, paths));
+        let parts = of_half.into_iter().chain(sums.iter().zip(0..).map(of_replicate));
+        parts.map(|(sum, paths)| sum / paths.max(1) as f64)
     }
 }
 

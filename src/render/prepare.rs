@@ -23,7 +23,7 @@ use crate::settings::{Integrator, RenderSettings, Use};
 /// One light path for so many camera paths. Their noise is little, so few will do: in the Cornell boxes work is within 15% with an eighth
 /// to a half of a light path for each camera path.
 const PIXELS_PER_PATH: u32 = 4;
-/// Sums of light paths over pixels and replicates, of 24 bytes each.
+/// Sums of light paths over pixels and parts of their samples, of 24 bytes each.
 const MOST_SUMS: u64 = 1 << 28;
 
 /// The size of images where neither settings nor camera say one.
@@ -263,8 +263,8 @@ fn check(settings: &RenderSettings, width: u32, height: u32) -> Result<(), Rende
         if !(error > 0.0 && error <= 1.0) {
             return Err(RenderError::Setting { setting: "error", value, expected: "above 0 and at most 1" });
         }
-        if settings.effective_replicates() < 2 {
-            let expected = "left out with a single replicate, which has no spread to tell an error from";
+        if settings.parts() < 2 {
+            let expected = "left out with a single sample, which has no spread to tell an error from";
             return Err(RenderError::Setting { setting: "error", value, expected });
         }
     }
@@ -286,7 +286,7 @@ fn light_paths(
     lights: &Lights,
     pixels: u32,
 ) -> Result<LightPaths, String> {
-    let sums = u64::from(pixels) * u64::from(settings.effective_replicates());
+    let sums = u64::from(pixels) * u64::from(settings.parts());
     let needed = [
         (settings.light_paths != Use::Never, "the settings ask for none"),
         (light_partner(settings) == Partner::Bsdf, "they are weighed against both other ways to find light"),

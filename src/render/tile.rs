@@ -40,9 +40,9 @@ struct Sums {
     hits: u32,
 }
 
-/// What a replicate's samples of a pixel add up to.
+/// What a part of a pixel's samples adds up to.
 #[derive(Clone, Copy, Debug, Default)]
-struct Replicate {
+struct Part {
     radiance: Rgb<f64>,
     count: u32,
 }
@@ -66,22 +66,24 @@ pub(super) struct Tile {
     pub(super) bad: Vec<BadSample>,
     /// By pixel, row by row; empty before the first sample, and again after the last.
     sums: Vec<Sums>,
-    /// By pixel, all of one pixel's together.
-    replicates: Vec<Replicate>,
+    /// By pixel, all of one pixel's together: of each replicate, or of a single one's first half and then of all its samples.
+    parts: Vec<Part>,
+    /// Where the second half begins of a single replicate.
+    second_half: Option<u32>,
     /// What the sums came to, by pixel; empty before the last sample.
     pixels: Vec<Pixel>,
 }
 
-/// Numbers of samples, each about twice the last, from as many as there are replicates up to all: after each a render may end.
+/// Numbers of samples, each about twice the last, from as many as there are parts up to all: after each a render may end.
 pub(super) fn levels(settings: &RenderSettings) -> impl Iterator<Item = u32> + use<> {
     let most = settings.spp;
-    let doubled = std::iter::successors(Some(settings.effective_replicates()), |n| n.checked_mul(2));
+    let doubled = std::iter::successors(Some(settings.parts()), |n| n.checked_mul(2));
     doubled.take_while(move |n| *n < most).chain(std::iter::once(most))
 }
 
 /// Memory for a pixel until its picture is finished: that of the result, and of the sums as well while the settings let all tiles go on.
 pub(super) fn bytes_a_pixel(settings: &RenderSettings) -> u64 {
-    let sums = size_of::<Sums>() + settings.effective_replicates() as usize * size_of::<Replicate>();
+    let sums = size_of::<Sums>() + settings.parts() as usize * size_of::<Part>();
     (size_of::<Pixel>() + if settings.error.is_some() { sums } else { 0 }) as u64
 }
 
@@ -105,16 +107,24 @@ impl Tile {
         u64::from(self.width) * u64::from(self.height)
     }
 
-    /// Makes room for the sums of its pixels.
-    pub(super) fn begin(&mut self, settings: &RenderSettings) {
+    /// Makes ready for as many as `samples` of each pixel.
+    pub(super) fn begin(&mut self, settings: &RenderSettings, samples: u32) {
         let area = self.area() as usize;
         self.sums.resize(area, Sums::default());
-        self.replicates.resize(area * settings.effective_replicates() as usize, Replicate::default());
+        self.parts.resize(area * settings.parts() as usize, Part::default());
+        self.second_half = settings.is_halved().then(|| second_half(samples));
     }
 
     /// Adds sample `sample` of a pixel.
     #[inline]
     pub(super) fn add(&mut self, pixel: usize, sample: u32, path: &PathSample) {
+        let count = self.parts.len() / self.sums.len();
+        let parts = &mut self.parts[pixel * count..][..count];
+        if self.second_half == Some(sample) {
+            parts[0] = parts[1];
+        }
+        let part =
+            if self.second_half.is_some() { &mut parts[1] } else { &mut parts[sample as usize % count] };
         self.rays += path.rays;
         let r = path.radiance;
         if !r.is_finite() || r.r < 0.0 || r.g < 0.0 || r.b < 0.0 {
@@ -125,10 +135,8 @@ impl Tile {
             }
             return;
         }
-        let replicates = self.replicates.len() / self.sums.len();
-        let set = &mut self.replicates[pixel * replicates + sample as usize % replicates];
-        set.radiance += r.cast();
-        set.count += 1;
+        part.radiance += r.cast();
+        part.count += 1;
         if let Some(first) = path.first {
             let sums = &mut self.sums[pixel];
             sums.albedo += first.albedo.cast();
@@ -165,18 +173,20 @@ impl Tile {
     fn settle(&mut self, lit: &LightImage) {
         if self.pixels.is_empty() {
             self.pixels = self.so_far(lit).collect();
-            (self.sums, self.replicates) = (Vec::new(), Vec::new());
+            (self.sums, self.parts) = (Vec::new(), Vec::new());
         }
     }
 
     fn so_far(&self, lit: &LightImage) -> impl Iterator<Item = Pixel> {
-        let replicates = self.replicates.len() / self.sums.len().max(1);
-        let of_camera = self.sums.iter().zip(self.replicates.chunks(replicates.max(1)));
-        self.places().zip(of_camera).map(|((x, y), (sums, sets))| {
+        let count = (self.parts.len() / self.sums.len().max(1)).max(1);
+        let is_halved = self.second_half.is_some();
+        let of_camera = self.sums.iter().zip(self.parts.chunks(count));
+        self.places().zip(of_camera).map(move |((x, y), (sums, parts))| {
+            let apart = (0..count).map(|i| if is_halved && i == 1 { parts[1] - parts[0] } else { parts[i] });
             let of_lights = lit.pixel(x, y).chain(std::iter::repeat(Rgb::BLACK));
-            sums.pixel(sets.iter().zip(of_lights).map(|(set, light)| Replicate {
-                radiance: set.radiance + light * f64::from(set.count),
-                count: set.count,
+            sums.pixel(apart.zip(of_lights).map(|(part, light)| Part {
+                radiance: part.radiance + light * f64::from(part.count),
+                count: part.count,
             }))
         })
     }
@@ -188,7 +198,7 @@ impl Tile {
     }
 
     /// The error that is expected of the tile, as `bench` measures it: the mean over pixels and channels of the variance over the
-    /// square plus 0.01. The few replicates of a single pixel tell little, those of all pixels together enough.
+    /// square plus 0.01. The few parts of a single pixel tell little, those of all pixels together enough.
     fn error(&self, lit: &LightImage) -> f64 {
         let of_pixel = |p: Pixel| {
             let (mean, variance) = (p.beauty.to_array(), p.variance.to_array());
@@ -199,8 +209,22 @@ impl Tile {
     }
 }
 
+impl std::ops::Sub for Part {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self { radiance: self.radiance - other.radiance, count: self.count - other.count }
+    }
+}
+
+/// The sample with which the second half of `samples` begins: the largest power of two before their end, with which the points of the first
+/// half are spread evenly, and where a render that doubles its samples has stood.
+pub(super) fn second_half(samples: u32) -> u32 {
+    samples.next_power_of_two() / 2
+}
+
 impl Sums {
-    fn pixel(&self, sets: impl Iterator<Item = Replicate> + Clone) -> Pixel {
+    fn pixel(&self, sets: impl Iterator<Item = Part> + Clone) -> Pixel {
         let samples: u32 = sets.clone().map(|set| set.count).sum();
         let n = f64::from(samples.max(1));
         let beauty = sets.clone().fold(Rgb::BLACK, |sum, set| sum + set.radiance) / n;
@@ -215,9 +239,10 @@ impl Sums {
     }
 }
 
-/// The variance of the pixel's mean from the spread of its replicates' means, each weighed by its share of the samples: with equal
-/// shares, their sample variance divided by their number. 0 with a single replicate, which has no spread.
-fn variance_of_mean(sets: impl Iterator<Item = Replicate> + Clone, mean: Rgb<f64>) -> Rgb<f64> {
+/// The variance of the pixel's mean from the spread of its parts' means, each weighed by its share of the samples: with equal
+/// shares, their sample variance divided by their number. 0 with a single part, which has no spread. Halves of one set complete each other:
+/// their spread is larger than that of independent ones would be.
+fn variance_of_mean(sets: impl Iterator<Item = Part> + Clone, mean: Rgb<f64>) -> Rgb<f64> {
     let filled = || sets.clone().filter(|set| set.count > 0);
     let count = filled().count();
     if count < 2 {
@@ -246,9 +271,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn variance_of_equal_replicates_is_their_spread_over_their_number() {
+    fn variance_of_equal_parts_is_their_spread_over_their_number() {
         let means = [1.0, 2.0, 4.0, 5.0];
-        let sets = means.map(|m| Replicate { radiance: Rgb::grey(m * 8.0), count: 8 });
+        let sets = means.map(|m| Part { radiance: Rgb::grey(m * 8.0), count: 8 });
         let v = variance_of_mean(sets.into_iter(), Rgb::grey(3.0));
         // Sample variance (4 + 1 + 1 + 4)/3, divided by 4.
         assert!((v.r - 10.0 / 12.0).abs() < 1e-12);
@@ -262,7 +287,12 @@ mod tests {
         };
         assert_eq!(levels(4, 50), [4, 8, 16, 32, 50]);
         assert_eq!(levels(4, 64), [4, 8, 16, 32, 64]);
+        assert_eq!(levels(1, 50), [2, 4, 8, 16, 32, 50]);
         assert_eq!(levels(1, 1), [1]);
+        // Where a single replicate is halved, a render that doubles has stood.
+        for (samples, second) in [(2, 1), (3, 2), (4, 2), (50, 32), (64, 32), (65, 64)] {
+            assert_eq!(second_half(samples), second);
+        }
     }
 
     #[test]

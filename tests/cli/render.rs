@@ -235,5 +235,5 @@ fn a_render_ends_at_an_error_or_when_time_is_up() {
     for (option, value) in [("--error", "0"), ("--error", "2"), ("--error", "nan"), ("--time-limit", "-1")] {
         run(&["-o", "c.exr", &format!("{option}={value}")]).ends_with(64).tells("is expected, such as");
     }
-    run(&["-o", "c.exr", "--error", "0.02", "--replicates", "1"]).ends_with(2).tells("a single replicate");
+    run(&["-o", "c.exr", "--error", "0.02", "--spp", "1"]).ends_with(2).tells("a single sample");
 }
