@@ -112,40 +112,56 @@ pub struct Texel {
 }
 
 impl Image {
-    /// The stored value of channel `c` at pixel `i`, integers scaled to [0, 1].
-    #[inline]
-    fn stored(&self, i: usize, c: usize) -> f32 {
-        let at = i * usize::from(self.channels) + c;
-        match &self.pixels {
-            Pixels::U8(v) => f32::from(v[at]) * (1.0 / 255.0),
-            Pixels::U16(v) => f32::from(v[at]) * (1.0 / 65535.0),
-            Pixels::F32(v) => v[at],
-            Pixels::Undecoded => 1.0,
-        }
-    }
-
     /// The texel at a pixel inside the image.
     #[inline]
     pub fn texel(&self, x: u32, y: u32, encoding: Encoding) -> Texel {
-        let i = y as usize * self.width as usize + x as usize;
-        let decode = |c: usize| match encoding {
-            Encoding::Linear => self.stored(i, c),
-            Encoding::Srgb => match &self.pixels {
-                Pixels::U8(v) => srgb_table()[usize::from(v[i * usize::from(self.channels) + c])],
-                Pixels::U16(_) | Pixels::F32(_) | Pixels::Undecoded => linear_from_srgb(self.stored(i, c)),
-            },
+        let channels = usize::from(self.channels);
+        let first = (y as usize * self.width as usize + x as usize) * channels;
+        let stored = first..first + channels;
+        let decode = |value: f32| match encoding {
+            Encoding::Linear => value,
+            Encoding::Srgb => linear_from_srgb(value),
         };
-        match self.channels {
-            1 | 2 => Texel {
-                color: Rgb::grey(decode(0)),
-                alpha: if self.channels == 2 { self.stored(i, 1) } else { 1.0 },
-            },
-            _ => Texel {
-                color: Rgb::new(decode(0), decode(1), decode(2)),
-                alpha: if self.channels == 4 { self.stored(i, 3) } else { 1.0 },
-            },
+        match (&self.pixels, encoding) {
+            (Pixels::U8(v), Encoding::Linear) => Texel::of(&v[stored], unit_of_u8, unit_of_u8),
+            (Pixels::U8(v), Encoding::Srgb) => {
+                let table = srgb_table();
+                Texel::of(&v[stored], |code| table[usize::from(code)], unit_of_u8)
+            }
+            (Pixels::U16(v), _) => Texel::of(&v[stored], |code| decode(unit_of_u16(code)), unit_of_u16),
+            (Pixels::F32(v), _) => Texel::of(&v[stored], decode, |alpha| alpha),
+            (Pixels::Undecoded, _) => Texel { color: Rgb::WHITE, alpha: 1.0 },
         }
     }
+}
+
+impl Texel {
+    /// What the channels of a pixel say: grey, grey and alpha, colour, or colour and alpha.
+    #[inline(always)]
+    fn of<T: Copy>(stored: &[T], color: impl Fn(T) -> f32, alpha: impl Fn(T) -> f32) -> Self {
+        match *stored {
+            [grey] => Self { color: Rgb::grey(color(grey)), alpha: 1.0 },
+            [grey, a] => Self { color: Rgb::grey(color(grey)), alpha: alpha(a) },
+            [r, g, b, a] => Self { color: Rgb::new(color(r), color(g), color(b)), alpha: alpha(a) },
+            [r, g, b, ..] => Self { color: Rgb::new(color(r), color(g), color(b)), alpha: 1.0 },
+            [] => Self { color: Rgb::WHITE, alpha: 1.0 },
+        }
+    }
+
+    #[inline(always)]
+    fn lerp(self, other: Self, t: f32) -> Self {
+        Self { color: self.color.lerp(other.color, t), alpha: self.alpha * (1.0 - t) + other.alpha * t }
+    }
+}
+
+#[inline(always)]
+fn unit_of_u8(code: u8) -> f32 {
+    f32::from(code) * (1.0 / 255.0)
+}
+
+#[inline(always)]
+fn unit_of_u16(code: u16) -> f32 {
+    f32::from(code) * (1.0 / 65535.0)
 }
 
 /// Linear values of all 8-bit sRGB codes.
@@ -159,6 +175,10 @@ impl Wrap {
     #[inline]
     pub fn pixel(self, i: i64, size: u32) -> u32 {
         let n = i64::from(size);
+        // Most are inside, and division is slow.
+        if (0..n).contains(&i) {
+            return i as u32;
+        }
         let wrapped = match self {
             Self::Clamp => i.clamp(0, n - 1),
             Self::Repeat => i.rem_euclid(n),
@@ -181,27 +201,20 @@ impl Texture {
             if p.is_finite() && p.abs() < 2.147e9 { p } else { 0.0 }
         };
         let (px, py) = (position(uv.x, image.width), position(uv.y, image.height));
-        let fetch = |x: i64, y: i64| {
-            image.texel(
-                self.wrap[0].pixel(x, image.width),
-                self.wrap[1].pixel(y, image.height),
-                self.encoding,
-            )
-        };
+        let column = |x: i64| self.wrap[0].pixel(x, image.width);
+        let row = |y: i64| self.wrap[1].pixel(y, image.height);
+        let fetch = |x: u32, y: u32| image.texel(x, y, self.encoding);
         match self.filter {
-            TexelFilter::Nearest => fetch(px.floor() as i64, py.floor() as i64),
+            TexelFilter::Nearest => fetch(column(px.floor() as i64), row(py.floor() as i64)),
             TexelFilter::Bilinear => {
                 let (fx, fy) = (px - 0.5, py - 0.5);
                 let (x, y) = (fx.floor(), fy.floor());
                 let (tx, ty) = (fx - x, fy - y);
                 let (x, y) = (x as i64, y as i64);
-                let mix = |a: Texel, b: Texel, t: f32| Texel {
-                    color: a.color.lerp(b.color, t),
-                    alpha: a.alpha * (1.0 - t) + b.alpha * t,
-                };
-                let top = mix(fetch(x, y), fetch(x + 1, y), tx);
-                let bottom = mix(fetch(x, y + 1), fetch(x + 1, y + 1), tx);
-                mix(top, bottom, ty)
+                let (x0, x1, y0, y1) = (column(x), column(x + 1), row(y), row(y + 1));
+                let top = fetch(x0, y0).lerp(fetch(x1, y0), tx);
+                let bottom = fetch(x0, y1).lerp(fetch(x1, y1), tx);
+                top.lerp(bottom, ty)
             }
         }
     }
