@@ -221,7 +221,7 @@ pub struct BadSample {
 pub struct Counts {
     /// Camera paths traced.
     pub paths: u64,
-    /// Rays traced: path segments and shadow rays.
+    /// Rays traced: path segments and shadow rays, those that jobs rendered together share as well.
     pub rays: u64,
     /// Samples dropped because they were not finite or negative.
     pub bad_samples: u64,
@@ -236,7 +236,7 @@ pub struct Counts {
 pub struct Timings {
     /// Preparing materials, lights and camera. The scene and its tree are made once for many jobs and don't count.
     pub prepare: f64,
-    /// Rendering.
+    /// Rendering; of jobs that were rendered together each one's share.
     pub render: f64,
     /// Writing and comparing.
     pub output: f64,
