@@ -26,24 +26,44 @@ impl Avx2 {
 
     /// [`traverse::closest`], compiled for AVX2.
     #[inline(always)]
-    pub(super) fn closest(self, bvh: &Bvh, ray: &Ray, counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
+    pub(super) fn closest<const INSTANCES: bool>(
+        self,
+        bvh: &Bvh,
+        ray: &Ray,
+        counts: impl FnMut(&Hit) -> bool,
+    ) -> Option<Hit> {
         #[target_feature(enable = "avx2,bmi1,popcnt")]
-        fn compiled(lanes: Avx2, bvh: &Bvh, ray: &Ray, counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-            traverse::closest(lanes, bvh, ray, counts)
+        fn compiled<const INSTANCES: bool>(
+            lanes: Avx2,
+            bvh: &Bvh,
+            ray: &Ray,
+            counts: impl FnMut(&Hit) -> bool,
+        ) -> Option<Hit> {
+            traverse::closest::<_, INSTANCES>(lanes, bvh, ray, counts)
         }
         // SAFETY: `self` proves that the processor has these features.
-        unsafe { compiled(self, bvh, ray, counts) }
+        unsafe { compiled::<INSTANCES>(self, bvh, ray, counts) }
     }
 
     /// [`traverse::visit`], compiled for AVX2.
     #[inline(always)]
-    pub(super) fn visit(self, bvh: &Bvh, ray: &Ray, visitor: impl FnMut(Hit) -> ControlFlow<()>) -> bool {
+    pub(super) fn visit<const INSTANCES: bool>(
+        self,
+        bvh: &Bvh,
+        ray: &Ray,
+        visitor: impl FnMut(Hit) -> ControlFlow<()>,
+    ) -> bool {
         #[target_feature(enable = "avx2,bmi1,popcnt")]
-        fn compiled(lanes: Avx2, bvh: &Bvh, ray: &Ray, visitor: impl FnMut(Hit) -> ControlFlow<()>) -> bool {
-            traverse::visit(lanes, bvh, ray, visitor)
+        fn compiled<const INSTANCES: bool>(
+            lanes: Avx2,
+            bvh: &Bvh,
+            ray: &Ray,
+            visitor: impl FnMut(Hit) -> ControlFlow<()>,
+        ) -> bool {
+            traverse::visit::<_, INSTANCES>(lanes, bvh, ray, visitor)
         }
         // SAFETY: `self` proves that the processor has these features.
-        unsafe { compiled(self, bvh, ray, visitor) }
+        unsafe { compiled::<INSTANCES>(self, bvh, ray, visitor) }
     }
 }
 
