@@ -119,7 +119,7 @@ fn tiles() -> Vec<[Vec3; 3]> {
     cube.into_iter().flat_map(turned).collect()
 }
 
-/// Half a million rays: what is found in shared meshes is what copies give, by every kernel, to the last bit.
+/// Four hundred thousand rays: what is found in shared meshes is what copies give, by every kernel, to the last bit.
 #[test]
 fn instances_are_hit_as_copies_are() {
     let plain = || vec![soup(300, 0.4), sphere(12, 24)];
@@ -159,11 +159,11 @@ fn instances_are_hit_as_copies_are() {
     let (mut hit, mut tied, mut least) = (0, 0, 1.0);
     for (name, twins) in scenes {
         assert!(twins.placed > 3, "{name}: {}", twins.placed);
-        let count = 50_000;
+        let count = 30_000;
         let [h, t] = twins.compare(name, count);
         (hit, tied, least) = (hit + h, tied + t, f64::min(least, h as f64 / count as f64));
     }
-    assert!(hit > 300_000 && tied > 30_000 && least > 0.2, "{hit} hits, {tied} ties, at least {least}");
+    assert!(hit > 200_000 && tied > 20_000 && least > 0.2, "{hit} hits, {tied} ties, at least {least}");
 }
 
 /// Transforms without a way back, or one that floats can't hold.
