@@ -31,8 +31,9 @@ use std::ops::{ControlFlow, RangeInclusive};
 use glam::{Affine3A, DMat3, DVec3, Mat3, Vec3};
 
 use super::lanes::{Floats, Lanes, Portable};
-use super::traverse::{Beam, Query, Space};
+use super::traverse::ROBUST_FAR;
 use super::triangle::ShearedRay;
+use super::two_levels::{Query, Space};
 use super::{Bvh, Child, Node, Ray};
 
 /// A mesh's place in a tree, fit for being traced.
@@ -155,7 +156,7 @@ pub(super) struct Inside<'a, L: Lanes> {
     instance: &'a Instance,
     /// In the world.
     ray: &'a ShearedRay,
-    beam: Beam<L>,
+    beam: WideBeam<L>,
     /// Whether the upper bound of a box makes its corner that the ray, along its main axis, comes to first.
     upper: [bool; 3],
 }
@@ -177,8 +178,35 @@ impl<'a, L: Lanes> Inside<'a, L> {
 }
 
 /// A ray taken to the mesh's space, for boxes as wide as the margin makes them.
+struct WideBeam<L: Lanes> {
+    /// Where it starts for near planes and for far ones.
+    origins: [[L::Floats; 3]; 2],
+    inverse: [L::Floats; 3],
+    backward: [bool; 3],
+}
+
+impl<L: Lanes> WideBeam<L> {
+    /// Where the ray enters a node's children and where it leaves them: as [`Node::enter`].
+    #[inline(always)]
+    fn cross(&self, lanes: L, node: &Node) -> [L::Floats; 2] {
+        let [near_x, far_x] = self.slab(lanes, node, 0);
+        let [near_y, far_y] = self.slab(lanes, node, 1);
+        let [near_z, far_z] = self.slab(lanes, node, 2);
+        let entry = near_x.max(near_y).max(near_z.max(lanes.splat(0.0)));
+        [entry, far_x.min(far_y).min(far_z) * lanes.splat(ROBUST_FAR)]
+    }
+
+    #[inline(always)]
+    fn slab(&self, lanes: L, node: &Node, axis: usize) -> [L::Floats; 2] {
+        let [lower, upper] = &node.bounds[axis];
+        let (near, far) = if self.backward[axis] { (upper, lower) } else { (lower, upper) };
+        let ([near_origin, far_origin], inverse) = (self.origins, self.inverse[axis]);
+        [(lanes.load(near) - near_origin[axis]) * inverse, (lanes.load(far) - far_origin[axis]) * inverse]
+    }
+}
+
 #[inline(always)]
-fn beam<L: Lanes>(lanes: L, frame: &Frame, ray: &Ray) -> Beam<L> {
+fn beam<L: Lanes>(lanes: L, frame: &Frame, ray: &Ray) -> WideBeam<L> {
     let [o, d] = [ray.origin.to_array(), ray.direction.to_array()];
     let far = ray.origin.abs().max_element();
     let along = |[x, y, z, _]: [f32; 4], [px, py, pz]: [f32; 3]| x * px + y * py + z * pz;
@@ -202,7 +230,7 @@ fn beam<L: Lanes>(lanes: L, frame: &Frame, ray: &Ray) -> Beam<L> {
             lanes.splat(origin[k] + sign * margin)
         })
     };
-    Beam { origins: [widened(1.0), widened(-1.0)], inverse: inverse.map(|v| lanes.splat(v)), backward }
+    WideBeam { origins: [widened(1.0), widened(-1.0)], inverse: inverse.map(|v| lanes.splat(v)), backward }
 }
 
 impl<L: Lanes> Space<L> for Inside<'_, L> {

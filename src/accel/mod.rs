@@ -19,6 +19,7 @@ mod places;
 mod tests;
 mod traverse;
 mod triangle;
+mod two_levels;
 
 use std::ops::ControlFlow;
 
@@ -196,7 +197,8 @@ impl Bvh {
         match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2(avx2) => avx2.closest::<INSTANCES>(self, ray, counts),
-            Instructions::Portable => traverse::closest::<_, INSTANCES>(Portable, self, ray, counts),
+            Instructions::Portable if INSTANCES => two_levels::closest(Portable, self, ray, counts),
+            Instructions::Portable => traverse::closest(Portable, self, ray, counts),
         }
     }
 
@@ -224,7 +226,8 @@ impl Bvh {
         match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2(avx2) => avx2.visit::<INSTANCES>(self, ray, visitor),
-            Instructions::Portable => traverse::visit::<_, INSTANCES>(Portable, self, ray, visitor),
+            Instructions::Portable if INSTANCES => two_levels::visit(Portable, self, ray, visitor),
+            Instructions::Portable => traverse::visit(Portable, self, ray, visitor),
         }
     }
 

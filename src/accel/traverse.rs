@@ -1,11 +1,9 @@
-//! How a ray finds its way through the tree.
+//! How a ray finds its way through a tree without instances.
 
 use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
-use super::block::Block;
-use super::instance::Inside;
 use super::lanes::{Floats, Lanes};
 use super::triangle::ShearedRay;
 use super::{Bvh, Child, Hit, Node, Ray};
@@ -14,287 +12,168 @@ use super::{Bvh, Child, Hit, Node, Ray};
 pub(super) const MOST_LEVELS: usize = 26;
 
 /// Each level on the way down leaves at most seven children behind; one more level joins two trees.
-const STACK: usize = 7 * (MOST_LEVELS + 1) + 1;
+pub(super) const STACK: usize = 7 * (MOST_LEVELS + 1) + 1;
 
 /// The far plane is moved out by this factor, so that rounding never makes a ray miss a box it grazes (Ize 2013, "Robust BVH
 /// Ray Traversal", JCGT 2:2): 1 + 2γ(3).
-const ROBUST_FAR: f32 = 1.000_000_4;
+pub(super) const ROBUST_FAR: f32 = 1.000_000_4;
 
 /// A ray made ready for eight boxes at a time.
 pub(super) struct Beam<L: Lanes> {
-    /// Where it starts for near and for far planes: the same place, unless boxes are to be taken for wider than they are.
-    pub(super) origins: [[L::Floats; 3]; 2],
-    pub(super) inverse: [L::Floats; 3],
+    origin: [L::Floats; 3],
+    inverse: [L::Floats; 3],
     /// Whether it runs towards smaller coordinates.
-    pub(super) backward: [bool; 3],
+    backward: [bool; 3],
 }
 
 impl<L: Lanes> Beam<L> {
     /// None for a ray that isn't finite, which hits nothing.
     #[inline(always)]
-    fn new(lanes: L, ray: &Ray) -> Option<Self> {
+    pub(super) fn new(lanes: L, ray: &Ray) -> Option<Self> {
         if !(ray.origin.is_finite() && ray.direction.is_finite()) {
             return None;
         }
         let inverse = ray.direction.to_array().map(|d| 1.0 / d);
-        let origin = ray.origin.to_array().map(|v| lanes.splat(v));
         Some(Self {
-            origins: [origin; 2],
+            origin: ray.origin.to_array().map(|v| lanes.splat(v)),
             inverse: inverse.map(|v| lanes.splat(v)),
             backward: inverse.map(|v| v < 0.0),
         })
     }
+}
 
-    /// Where the ray enters a node's children and where it leaves them.
+impl Node {
+    /// Where the ray enters the children, and which of them it enters before `t_max`.
     ///
     /// A direction component of 0 makes 0·∞ = NaN where the origin lies in the plane of a face: minimum and maximum then take
     /// their second operand, and the slab does not cut.
     #[inline(always)]
-    pub(super) fn cross(&self, lanes: L, node: &Node) -> [L::Floats; 2] {
-        let [near_x, far_x] = self.slab(lanes, node, 0);
-        let [near_y, far_y] = self.slab(lanes, node, 1);
-        let [near_z, far_z] = self.slab(lanes, node, 2);
+    pub(super) fn enter<L: Lanes>(&self, lanes: L, ray: &Beam<L>, t_max: f32) -> (L::Floats, u32) {
+        let [near_x, far_x] = self.slab(lanes, ray, 0);
+        let [near_y, far_y] = self.slab(lanes, ray, 1);
+        let [near_z, far_z] = self.slab(lanes, ray, 2);
         let entry = near_x.max(near_y).max(near_z.max(lanes.splat(0.0)));
         let exit = far_x.min(far_y).min(far_z) * lanes.splat(ROBUST_FAR);
-        [entry, exit]
+        (entry, entry.at_most(exit.min(lanes.splat(t_max))))
     }
 
     /// Where the ray crosses the near and the far planes across an axis.
     #[inline(always)]
-    fn slab(&self, lanes: L, node: &Node, axis: usize) -> [L::Floats; 2] {
-        let [lower, upper] = &node.bounds[axis];
-        let (near, far) = if self.backward[axis] { (upper, lower) } else { (lower, upper) };
-        let ([near_origin, far_origin], inverse) = (self.origins, self.inverse[axis]);
-        [(lanes.load(near) - near_origin[axis]) * inverse, (lanes.load(far) - far_origin[axis]) * inverse]
+    fn slab<L: Lanes>(&self, lanes: L, ray: &Beam<L>, axis: usize) -> [L::Floats; 2] {
+        let [lower, upper] = &self.bounds[axis];
+        let (near, far) = if ray.backward[axis] { (upper, lower) } else { (lower, upper) };
+        let (origin, inverse) = (ray.origin[axis], ray.inverse[axis]);
+        [(lanes.load(near) - origin) * inverse, (lanes.load(far) - origin) * inverse]
     }
-}
-
-/// What a tree's boxes and leaves are to a ray, by the space that they are in.
-pub(super) trait Space<L: Lanes> {
-    /// A bound of where the ray hits what is in the children, never too large nor negative, and which of them it enters before
-    /// `t_max`.
-    fn enter(&self, node: &Node, t_max: f32) -> (L::Floats, u32);
-
-    /// Tells `query` what the ray hits in a leaf.
-    fn leaf<Q: Query>(&mut self, leaf: usize, query: &mut Q) -> ControlFlow<()>;
-}
-
-/// What one wants to know of the hits.
-pub(super) trait Query {
-    /// How far hits are of interest.
-    fn t_max(&self) -> f32;
-
-    /// Takes notice of a hit no farther; breaks when it wants no more.
-    fn found(&mut self, hit: Hit) -> ControlFlow<()>;
-
-    /// Searches what is under `root`.
-    fn search<L: Lanes, S: Space<L>>(
-        &mut self,
-        nodes: &[Node],
-        space: &mut S,
-        root: Child,
-    ) -> ControlFlow<()>;
-
-    /// Finds the hits in a block.
-    #[inline(always)]
-    fn look_at<L: Lanes>(&mut self, lanes: L, block: &Block, ray: &ShearedRay) -> ControlFlow<()> {
-        let t_max = self.t_max();
-        block.each_hit(lanes, ray, t_max, |hit| self.found(hit))
-    }
-}
-
-/// The world, in which the tree has its root, with instances in it or without.
-struct World<'a, L: Lanes, const INSTANCES: bool> {
-    lanes: L,
-    bvh: &'a Bvh,
-    ray: &'a Ray,
-    beam: Beam<L>,
-    /// Many rays meet no leaf.
-    sheared: Option<ShearedRay>,
-}
-
-impl<'a, L: Lanes, const INSTANCES: bool> World<'a, L, INSTANCES> {
-    #[inline(always)]
-    fn new(lanes: L, bvh: &'a Bvh, ray: &'a Ray) -> Option<Self> {
-        let beam = Beam::new(lanes, ray)?;
-        Some(Self { lanes, bvh, ray, beam, sheared: None })
-    }
-}
-
-impl<L: Lanes, const INSTANCES: bool> Space<L> for World<'_, L, INSTANCES> {
-    #[inline(always)]
-    fn enter(&self, node: &Node, t_max: f32) -> (L::Floats, u32) {
-        let [entry, exit] = self.beam.cross(self.lanes, node);
-        (entry, entry.at_most(exit.min(self.lanes.splat(t_max))))
-    }
-
-    #[inline(always)]
-    fn leaf<Q: Query>(&mut self, leaf: usize, query: &mut Q) -> ControlFlow<()> {
-        let sheared = self.sheared.get_or_insert_with(|| ShearedRay::new(self.ray));
-        if INSTANCES && let Some(instance) = self.bvh.instance(leaf) {
-            let mut inside = Inside::new(self.lanes, self.bvh, instance, self.ray, sheared);
-            return query.search(&self.bvh.nodes, &mut inside, instance.root);
-        }
-        query.look_at(self.lanes, &self.bvh.blocks[leaf], sheared)
-    }
-}
-
-/// The nearest of the hits that `counts`, among equally near ones the one of the lowest index. `INSTANCES` tells whether the tree has
-/// any.
-#[inline(always)]
-pub(super) fn closest<L: Lanes, const INSTANCES: bool>(
-    lanes: L,
-    bvh: &Bvh,
-    ray: &Ray,
-    counts: impl FnMut(&Hit) -> bool,
-) -> Option<Hit> {
-    let mut world = World::<L, INSTANCES>::new(lanes, bvh, ray)?;
-    // No index is lower than 0: the ray's end itself is out of reach.
-    let mut query = Nearest { t_max: ray.t_max, rival: 0, nearest: None, counts };
-    let _ = query.search(&bvh.nodes, &mut world, bvh.root);
-    query.nearest
-}
-
-/// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
-#[inline(always)]
-pub(super) fn visit<L: Lanes, const INSTANCES: bool>(
-    lanes: L,
-    bvh: &Bvh,
-    ray: &Ray,
-    visitor: impl FnMut(Hit) -> ControlFlow<()>,
-) -> bool {
-    let Some(mut world) = World::<L, INSTANCES>::new(lanes, bvh, ray) else { return false };
-    let mut query = Each { t_max: ray.t_max, visitor };
-    query.search(&bvh.nodes, &mut world, bvh.root).is_break()
 }
 
 /// A child and where the ray enters it, which is never negative, so that keys sort by the entry.
-fn key(entry: f32, child: Child) -> u64 {
+pub(super) fn key(entry: f32, child: Child) -> u64 {
     u64::from(entry.to_bits()) << 32 | u64::from(child.0)
 }
 
-/// Asks for the nearest hit that counts.
-struct Nearest<C> {
-    t_max: f32,
-    /// The triangle of the nearest hit so far.
-    rival: u32,
-    nearest: Option<Hit>,
-    counts: C,
-}
-
-impl<C: FnMut(&Hit) -> bool> Query for Nearest<C> {
-    #[inline(always)]
-    fn t_max(&self) -> f32 {
-        self.t_max
-    }
-
-    #[inline(always)]
-    fn found(&mut self, hit: Hit) -> ControlFlow<()> {
-        let is_nearer = hit.t < self.t_max || (hit.t == self.t_max && hit.triangle < self.rival);
-        if is_nearer && (self.counts)(&hit) {
-            (self.t_max, self.rival) = (hit.t, hit.triangle);
-            self.nearest = Some(hit);
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// The nearest child first.
-    #[inline(always)]
-    fn search<L: Lanes, S: Space<L>>(
-        &mut self,
-        nodes: &[Node],
-        space: &mut S,
-        root: Child,
-    ) -> ControlFlow<()> {
-        let mut pending = ArrayVec::<u64, STACK>::new();
-        let mut child = root;
-        loop {
-            if let Some(leaf) = child.leaf() {
-                space.leaf(leaf, self)?;
-            } else {
-                let node = &nodes[child.node()];
-                let (entry, mut entered) = space.enter(node, self.t_max);
-                if entered != 0 {
-                    let entry = entry.to_array();
-                    let mut next = || {
-                        let lane = entered.trailing_zeros() as usize % 8;
-                        entered &= entered - 1;
-                        (entered, key(entry[lane], node.child[lane]))
-                    };
-                    let (mut rest, mut first) = next();
-                    // The nearest goes on; the others wait, the nearer on top.
-                    let bottom = pending.len();
-                    while rest != 0 {
-                        let (left, other) = next();
-                        rest = left;
-                        let farther = first.max(other);
-                        first = first.min(other);
-                        pending.push(farther);
-                        let mut at = pending.len() - 1;
-                        while at > bottom && pending[at - 1] < farther {
-                            pending[at] = pending[at - 1];
-                            at -= 1;
-                        }
-                        pending[at] = farther;
+/// The nearest of the hits that `counts`, among equally near ones the one of the lowest index.
+#[inline(always)]
+pub(super) fn closest<L: Lanes>(
+    lanes: L,
+    bvh: &Bvh,
+    ray: &Ray,
+    mut counts: impl FnMut(&Hit) -> bool,
+) -> Option<Hit> {
+    let beam = Beam::new(lanes, ray)?;
+    // Many rays meet no leaf.
+    let mut sheared = None;
+    let mut nearest = None;
+    // No index is lower than 0: the ray's end itself is out of reach.
+    let (mut t_max, mut rival) = (ray.t_max, 0);
+    let mut pending = ArrayVec::<u64, STACK>::new();
+    let mut child = bvh.root;
+    loop {
+        if let Some(leaf) = child.leaf() {
+            let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
+            let _ = bvh.blocks[leaf].each_hit(lanes, sheared, t_max, |hit| {
+                let is_nearer = hit.t < t_max || (hit.t == t_max && hit.triangle < rival);
+                if is_nearer && counts(&hit) {
+                    (t_max, rival) = (hit.t, hit.triangle);
+                    nearest = Some(hit);
+                }
+                ControlFlow::Continue(())
+            });
+        } else {
+            let node = &bvh.nodes[child.node()];
+            let (entry, mut entered) = node.enter(lanes, &beam, t_max);
+            if entered != 0 {
+                let entry = entry.to_array();
+                let mut next = || {
+                    let lane = entered.trailing_zeros() as usize % 8;
+                    entered &= entered - 1;
+                    (entered, key(entry[lane], node.child[lane]))
+                };
+                let (mut rest, mut first) = next();
+                // The nearest goes on; the others wait, the nearer on top.
+                let bottom = pending.len();
+                while rest != 0 {
+                    let (left, other) = next();
+                    rest = left;
+                    let farther = first.max(other);
+                    first = first.min(other);
+                    pending.push(farther);
+                    let mut at = pending.len() - 1;
+                    while at > bottom && pending[at - 1] < farther {
+                        pending[at] = pending[at - 1];
+                        at -= 1;
                     }
-                    child = Child(first as u32);
-                    continue;
+                    pending[at] = farther;
                 }
+                child = Child(first as u32);
+                continue;
             }
-            // What begins behind the nearest hit is left out.
-            child = loop {
-                let Some(key) = pending.pop() else { return ControlFlow::Continue(()) };
-                if f32::from_bits((key >> 32) as u32) <= self.t_max {
-                    break Child(key as u32);
-                }
-            };
         }
+        // What begins behind the nearest hit is left out.
+        child = loop {
+            let Some(key) = pending.pop() else { return nearest };
+            if f32::from_bits((key >> 32) as u32) <= t_max {
+                break Child(key as u32);
+            }
+        };
     }
 }
 
-/// Asks for every hit.
-struct Each<V> {
-    t_max: f32,
-    visitor: V,
-}
-
-impl<V: FnMut(Hit) -> ControlFlow<()>> Query for Each<V> {
-    #[inline(always)]
-    fn t_max(&self) -> f32 {
-        self.t_max
-    }
-
-    #[inline(always)]
-    fn found(&mut self, hit: Hit) -> ControlFlow<()> {
-        if hit.t < self.t_max { (self.visitor)(hit) } else { ControlFlow::Continue(()) }
-    }
-
-    /// Children are visited in the order that the tree keeps them: those first that most likely hide something for the least work.
-    #[inline(always)]
-    fn search<L: Lanes, S: Space<L>>(
-        &mut self,
-        nodes: &[Node],
-        space: &mut S,
-        root: Child,
-    ) -> ControlFlow<()> {
-        let mut pending = ArrayVec::<Child, STACK>::new();
-        let mut child = root;
-        loop {
-            if let Some(leaf) = child.leaf() {
-                space.leaf(leaf, self)?;
-            } else {
-                let node = &nodes[child.node()];
-                let (_, mut entered) = space.enter(node, self.t_max);
-                while entered != 0 {
-                    let last = 31 - entered.leading_zeros();
-                    entered ^= 1 << last;
-                    pending.push(node.child[last as usize % 8]);
-                }
+/// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
+///
+/// Children are visited in the order that the tree keeps them: those first that most likely hide something for the least work.
+#[inline(always)]
+pub(super) fn visit<L: Lanes>(
+    lanes: L,
+    bvh: &Bvh,
+    ray: &Ray,
+    mut visitor: impl FnMut(Hit) -> ControlFlow<()>,
+) -> bool {
+    let Some(beam) = Beam::new(lanes, ray) else { return false };
+    let mut sheared = None;
+    let mut pending = ArrayVec::<Child, STACK>::new();
+    let mut child = bvh.root;
+    loop {
+        if let Some(leaf) = child.leaf() {
+            let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
+            let went_through = bvh.blocks[leaf].each_hit(lanes, sheared, ray.t_max, |hit| {
+                if hit.t < ray.t_max { visitor(hit) } else { ControlFlow::Continue(()) }
+            });
+            if went_through.is_break() {
+                return true;
             }
-            match pending.pop() {
-                Some(next) => child = next,
-                None => return ControlFlow::Continue(()),
+        } else {
+            let node = &bvh.nodes[child.node()];
+            let (_, mut entered) = node.enter(lanes, &beam, ray.t_max);
+            while entered != 0 {
+                let last = 31 - entered.leading_zeros();
+                entered ^= 1 << last;
+                pending.push(node.child[last as usize % 8]);
             }
+        }
+        match pending.pop() {
+            Some(next) => child = next,
+            None => return false,
         }
     }
 }
