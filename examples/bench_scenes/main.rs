@@ -212,7 +212,7 @@ fn forest(count: u64) -> Glb {
     let mut tree = Mesh::default();
     for i in 0..50_000 {
         let turn = DQuat::from_rotation_arc(DVec3::Z, anywhere(i, 3).normalize_or(DVec3::Z));
-        let at = anywhere(i, 0).normalize_or(DVec3::Y) * random(i, 6).cbrt() * DVec3::new(1.2, 1.7, 1.2);
+        let at = anywhere(i, 0).normalize_or(DVec3::Y) * libm::cbrt(random(i, 6)) * DVec3::new(1.2, 1.7, 1.2);
         let leaf = turn * DVec3::new(0.05, 0.0, 0.0);
         tree.append(&rectangle(at + DVec3::Y * 2.2, leaf, turn * DVec3::new(0.0, 0.08, 0.0)));
     }

@@ -205,6 +205,7 @@ impl<L: Lanes> WideBeam<L> {
     }
 }
 
+/// The ray in the mesh's space, each box as much wider as rounding may be wrong.
 #[inline(always)]
 fn beam<L: Lanes>(lanes: L, frame: &Frame, ray: &Ray) -> WideBeam<L> {
     let [o, d] = [ray.origin.to_array(), ray.direction.to_array()];

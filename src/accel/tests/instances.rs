@@ -124,7 +124,7 @@ fn tiles() -> Vec<[Vec3; 3]> {
 fn instances_are_hit_as_copies_are() {
     let plain = || vec![soup(300, 0.4), sphere(12, 24)];
     let uniform = |i: u64, by: f32| turned(i, Vec3::splat(by * (0.5 + random(i, 240))), vector(i, 250) * by);
-    let signs = |i: u64| Vec3::new(1.0, if i % 2 == 0 { -1.0 } else { 1.0 }, 1.0);
+    let signs = |i: u64| Vec3::new(1.0, if i.is_multiple_of(2) { -1.0 } else { 1.0 }, 1.0);
     let far = |i: u64, by: f32| turned(i, signs(i), vector(i, 250) + Vec3::new(by, -0.3 * by, 0.01 * by));
     let squashed = |i: u64| turned(i, Vec3::new(2.0, 0.01, 0.3) * signs(i), vector(i, 250));
     let needles = soup(300, 1.0).into_iter().map(|[a, b, _]| [a, b, a.lerp(b, 0.3) + Vec3::splat(1e-4)]);
