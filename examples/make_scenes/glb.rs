@@ -125,6 +125,7 @@ impl Glb {
     }
 
     /// Adds a mesh that stands in several places: moved, turned and scaled, all under one node called `name`.
+    #[allow(dead_code, reason = "scenes for benchmarks alone have instances")]
     pub(crate) fn mesh_in_places(
         &mut self,
         name: &str,
