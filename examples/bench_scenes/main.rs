@@ -1,4 +1,5 @@
-//! Writes scenes that are hard to light into a folder, for `pipeline bench`; they are too large to keep, or of no use but that.
+//! Writes scenes that are hard to light, or that stand for a lot, into a folder, for `pipeline bench`; they are too large to keep, or of
+//! no use but that.
 //!
 //! ```text
 //! cargo run --release --example bench_scenes -- FOLDER
@@ -66,13 +67,21 @@ fn run() -> Result<(), MakeError> {
     for (name, light) in scenes {
         let mut glb = stage();
         light(&mut glb);
-        let about = format!("{} triangles", glb.triangles());
-        write_whole(&folder.join(format!("{name}.glb")), &glb.finish(name)?)?;
-        let _ = writeln!(io::stderr(), "written   {name}.glb   {about}");
+        write(folder, name, glb)?;
+    }
+    for (name, trees) in [("grove", 100), ("forest", 1000)] {
+        write(folder, name, forest(trees))?;
     }
     write_exr(&folder.join("sun.exr"), &sky())?;
     write_whole(&folder.join("sun.toml"), SUN.as_bytes())?;
     let _ = writeln!(io::stderr(), "written   sun.exr, sun.toml");
+    Ok(())
+}
+
+fn write(folder: &Path, name: &str, glb: Glb) -> Result<(), MakeError> {
+    let about = format!("{} triangles", glb.triangles());
+    write_whole(&folder.join(format!("{name}.glb")), &glb.finish(name)?)?;
+    let _ = writeln!(io::stderr(), "written   {name}.glb   {about}");
     Ok(())
 }
 
@@ -191,6 +200,32 @@ fn through_glass(glb: &mut Glb) {
     slab.append(&rectangle(corner, back, right));
     slab.append(&rectangle(corner + up, right, back));
     glb.mesh("pane", &slab, pane);
+}
+
+/// A meadow of `count` trees, one mesh of 100,000 triangles, turned about their trunks and of any size from a half to one and a half.
+fn forest(count: u64) -> Glb {
+    let mut glb = Glb::default();
+    let side = 4.0 * (count as f64).sqrt();
+    let ground = glb.plain("ground", [0.3, 0.25, 0.15], 1.0);
+    let corner = DVec3::new(-0.5 * side, 0.0, 0.5 * side);
+    glb.mesh("ground", &rectangle(corner, DVec3::X * side, -DVec3::Z * side), ground);
+    let mut tree = Mesh::default();
+    for i in 0..50_000 {
+        let turn = DQuat::from_rotation_arc(DVec3::Z, anywhere(i, 3).normalize_or(DVec3::Z));
+        let at = anywhere(i, 0).normalize_or(DVec3::Y) * libm::cbrt(random(i, 6)) * DVec3::new(1.2, 1.7, 1.2);
+        let leaf = turn * DVec3::new(0.05, 0.0, 0.0);
+        tree.append(&rectangle(at + DVec3::Y * 2.2, leaf, turn * DVec3::new(0.0, 0.08, 0.0)));
+    }
+    let places: Vec<_> = (0..count)
+        .map(|i| {
+            let at = anywhere(i, 20) * DVec3::new(0.5 * side, 0.0, 0.5 * side);
+            (at, DQuat::from_rotation_y(std::f64::consts::TAU * random(i, 30)), 0.5 + random(i, 31))
+        })
+        .collect();
+    let leaves = glb.plain("leaves", [0.1, 0.3, 0.05], 0.6);
+    glb.mesh_in_places("tree", &tree, leaves, &places);
+    glb.camera(DVec3::new(0.0, 5.0, 0.5 * side + 6.0), DVec3::new(0.0, 1.0, 0.0), 40.0, 4.0 / 3.0);
+    glb
 }
 
 /// GLBs have no environment: a manifest lights `sun.glb` with it.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::Cursor;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png};
 use serde_json::{Value, json};
 
@@ -124,6 +124,30 @@ impl Glb {
         self.nodes.push(json!({ "name": name, "mesh": self.meshes.len() - 1 }));
     }
 
+    /// Adds a mesh that stands in several places: moved, turned and scaled, all under one node called `name`.
+    #[allow(dead_code, reason = "scenes for benchmarks alone have instances")]
+    pub(crate) fn mesh_in_places(
+        &mut self,
+        name: &str,
+        mesh: &Mesh,
+        material: usize,
+        places: &[(DVec3, DQuat, f64)],
+    ) {
+        let triangles = self.triangles;
+        self.mesh(name, mesh, material);
+        self.triangles = triangles + mesh.triangles.len() * places.len();
+        let extension = "EXT_mesh_gpu_instancing";
+        self.extensions.insert(extension.to_owned());
+        let attributes = json!({
+            "TRANSLATION": self.floats(places.iter().map(|(at, _, _)| at.to_array()), Bounds::Omitted),
+            "ROTATION": self.floats(places.iter().map(|(_, turn, _)| turn.to_array()), Bounds::Omitted),
+            "SCALE": self.floats(places.iter().map(|(_, _, scale)| [*scale; 3]), Bounds::Omitted),
+        });
+        if let Some(node) = self.nodes.last_mut() {
+            node["extensions"] = json!({ extension: { "attributes": attributes } });
+        }
+    }
+
     fn primitive(&mut self, mesh: &Mesh, material: usize) -> Value {
         let mut attributes = json!({
             "POSITION": self.floats(mesh.positions.iter().map(|p| p.to_array()), Bounds::Stated),
@@ -148,7 +172,7 @@ impl Glb {
         let rows: Vec<[f32; N]> = rows.map(|row| row.map(|x| x as f32)).collect();
         let bytes: Vec<u8> = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         let view = self.view(&bytes, Some(ARRAY_BUFFER));
-        let kind = if N == 2 { "VEC2" } else { "VEC3" };
+        let kind = format!("VEC{N}");
         let mut accessor =
             json!({ "bufferView": view, "componentType": FLOAT, "count": rows.len(), "type": kind });
         if bounds == Bounds::Stated {

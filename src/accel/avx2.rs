@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, ControlFlow, Div, Mul, Sub};
 
 use super::lanes::{Floats, Lanes};
-use super::{Bvh, Hit, Ray, traverse};
+use super::{Bvh, Hit, Ray, traverse, two_levels};
 
 /// Proof that the running processor has AVX2: only [`Self::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
@@ -24,26 +24,54 @@ impl Avx2 {
         has.then_some(Self(()))
     }
 
-    /// [`traverse::closest`], compiled for AVX2.
+    /// [`traverse::closest`] or [`two_levels::closest`], compiled for AVX2.
     #[inline(always)]
-    pub(super) fn closest(self, bvh: &Bvh, ray: &Ray, counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
+    pub(super) fn closest<const INSTANCES: bool>(
+        self,
+        bvh: &Bvh,
+        ray: &Ray,
+        counts: impl FnMut(&Hit) -> bool,
+    ) -> Option<Hit> {
         #[target_feature(enable = "avx2,bmi1,popcnt")]
-        fn compiled(lanes: Avx2, bvh: &Bvh, ray: &Ray, counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-            traverse::closest(lanes, bvh, ray, counts)
+        fn compiled<const INSTANCES: bool>(
+            lanes: Avx2,
+            bvh: &Bvh,
+            ray: &Ray,
+            counts: impl FnMut(&Hit) -> bool,
+        ) -> Option<Hit> {
+            if INSTANCES {
+                two_levels::closest(lanes, bvh, ray, counts)
+            } else {
+                traverse::closest(lanes, bvh, ray, counts)
+            }
         }
         // SAFETY: `self` proves that the processor has these features.
-        unsafe { compiled(self, bvh, ray, counts) }
+        unsafe { compiled::<INSTANCES>(self, bvh, ray, counts) }
     }
 
-    /// [`traverse::visit`], compiled for AVX2.
+    /// [`traverse::visit`] or [`two_levels::visit`], compiled for AVX2.
     #[inline(always)]
-    pub(super) fn visit(self, bvh: &Bvh, ray: &Ray, visitor: impl FnMut(Hit) -> ControlFlow<()>) -> bool {
+    pub(super) fn visit<const INSTANCES: bool>(
+        self,
+        bvh: &Bvh,
+        ray: &Ray,
+        visitor: impl FnMut(Hit) -> ControlFlow<()>,
+    ) -> bool {
         #[target_feature(enable = "avx2,bmi1,popcnt")]
-        fn compiled(lanes: Avx2, bvh: &Bvh, ray: &Ray, visitor: impl FnMut(Hit) -> ControlFlow<()>) -> bool {
-            traverse::visit(lanes, bvh, ray, visitor)
+        fn compiled<const INSTANCES: bool>(
+            lanes: Avx2,
+            bvh: &Bvh,
+            ray: &Ray,
+            visitor: impl FnMut(Hit) -> ControlFlow<()>,
+        ) -> bool {
+            if INSTANCES {
+                two_levels::visit(lanes, bvh, ray, visitor)
+            } else {
+                traverse::visit(lanes, bvh, ray, visitor)
+            }
         }
         // SAFETY: `self` proves that the processor has these features.
-        unsafe { compiled(self, bvh, ray, visitor) }
+        unsafe { compiled::<INSTANCES>(self, bvh, ray, visitor) }
     }
 }
 

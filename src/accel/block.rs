@@ -12,6 +12,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 use super::Hit;
+use super::instance::Instance;
 use super::lanes::{Floats, Lanes};
 use super::triangle::{NOBODY, ShearedRay, UNCERTAIN, intersect};
 
@@ -47,6 +48,33 @@ impl Block {
     pub(super) fn triangles(&self) -> impl Iterator<Item = (u32, [Vec3; 3])> {
         let taken = self.ids.iter().take_while(|&&id| id != NOBODY);
         taken.enumerate().map(|(lane, &id)| (id, self.corners(lane)))
+    }
+
+    /// Calls `visitor` with the index of every triangle whose box touches the one between `low` and `high`.
+    pub(super) fn visit_box(&self, low: Vec3, high: Vec3, visitor: &mut impl FnMut(u32)) {
+        for (id, [a, b, c]) in self.triangles() {
+            if a.min(b).min(c).cmple(high).all() && a.max(b).max(c).cmpge(low).all() {
+                visitor(id);
+            }
+        }
+    }
+
+    /// Gives the triangles the indices that `index_of` makes of their own.
+    pub(super) fn renumber(&mut self, index_of: impl Fn(u32) -> u32) {
+        self.ids = self.ids.map(|id| if id == NOBODY { NOBODY } else { index_of(id) });
+    }
+
+    /// The triangles in their place in the world, under the indices that they have there.
+    #[inline(always)]
+    pub(super) fn placed<L: Lanes>(&self, lanes: L, instance: &Instance) -> Self {
+        let mut placed = *self;
+        for (to, [x, y, z]) in placed.vertices.iter_mut().zip(&self.vertices) {
+            for (axis, to) in to.iter_mut().enumerate() {
+                *to = instance.frame.placed_lanes(lanes, axis, [x, y, z]).to_array();
+            }
+        }
+        placed.renumber(|id| id + instance.first);
+        placed
     }
 
     fn corners(&self, lane: usize) -> [Vec3; 3] {

@@ -5,7 +5,6 @@ use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
-use super::block::Block;
 use super::places::Places;
 
 /// What a wide node and a block of triangles cost, whatever they hold: both are tested at once.
@@ -17,6 +16,8 @@ pub(super) struct Plan<'a> {
     tree: &'a Bvh2,
     /// What its leaves hold.
     places: &'a Places,
+    /// How many triangles a leaf has room for.
+    leaf_room: usize,
     /// The half area of the root's box.
     whole: f64,
     /// What is under each node.
@@ -36,7 +37,7 @@ struct Part {
 
 impl<'a> Plan<'a> {
     /// Plans for a `tree` with one of the `places` a leaf and parents before their children.
-    pub(super) fn new(tree: &'a Bvh2, triangles: &[[Vec3; 3]], places: &'a Places) -> Self {
+    pub(super) fn new(tree: &'a Bvh2, triangles: &[[Vec3; 3]], places: &'a Places, leaf_room: usize) -> Self {
         let area = |&t: &u32| {
             let [a, b, c] = triangles[t as usize];
             (b - a).cross(c - a).length()
@@ -46,6 +47,7 @@ impl<'a> Plan<'a> {
         let mut plan = Self {
             tree,
             places,
+            leaf_room,
             whole: half_area(&tree.nodes[0].aabb).max(f64::MIN_POSITIVE),
             parts: vec![Part::default(); tree.nodes.len()],
         };
@@ -54,7 +56,7 @@ impl<'a> Plan<'a> {
                 None => {
                     let place = plan.place(n);
                     let count = places.count(place);
-                    let blocks = count.div_ceil(Block::ROOM as u32) as f32;
+                    let blocks = count.div_ceil(leaf_room as u32) as f32;
                     let costs = [BLOCK_COST * blocks * plan.probability(n); 7];
                     Part { costs, count, area: areas[place as usize] }
                 }
@@ -72,7 +74,7 @@ impl<'a> Plan<'a> {
         let count = left.count + right.count;
         let probability = self.probability(n);
         let inner = NODE_COST * probability + cut(8);
-        let fits = count as usize <= Block::ROOM;
+        let fits = count as usize <= self.leaf_room;
         let mut costs = [if fits { inner.min(BLOCK_COST * probability) } else { inner }; 7];
         for i in 1..7 {
             costs[i] = cut(i + 1).min(costs[i - 1]);
@@ -84,7 +86,7 @@ impl<'a> Plan<'a> {
     pub(super) fn leaf(&self, n: u32) -> Option<Vec<u32>> {
         let part = &self.parts[n as usize];
         let is_block =
-            part.count as usize <= Block::ROOM && BLOCK_COST * self.probability(n) <= part.costs[0];
+            part.count as usize <= self.leaf_room && BLOCK_COST * self.probability(n) <= part.costs[0];
         (is_block || self.children(n).is_none()).then(|| self.triangles(n))
     }
 

@@ -4,25 +4,31 @@
 //! tested against eight boxes or eight triangles at a time, with AVX2 where the processor has it and in plain Rust elsewhere: the
 //! same operations in the same order, so that hits are the same bits. Triangles are watertight by Woop, Benthin and Wald 2013, boxes
 //! by Ize 2013.
+//!
+//! A mesh that stands in many places can be in the tree once: see `instance.rs`. Hits are those that copies would give, bit for bit.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod block;
 mod build;
 mod collapse;
+mod instance;
 mod lanes;
 mod places;
 #[cfg(test)]
 mod tests;
 mod traverse;
 mod triangle;
+mod two_levels;
 
 use std::ops::ControlFlow;
 
 use glam::Vec3;
 
 use block::Block;
-pub use build::BuildError;
+pub use build::{BuildError, Shared};
+use instance::Instance;
+pub use instance::Placement;
 use lanes::Portable;
 
 /// A ray segment: origin + t·direction for t in (0, `t_max`). The direction need not have unit length.
@@ -62,7 +68,9 @@ pub struct Bvh {
     root: Child,
     nodes: Vec<Node>,
     blocks: Vec<Block>,
-    /// The number of triangles.
+    /// Meshes in their places, whose trees are among the nodes and blocks.
+    instances: Vec<Instance>,
+    /// The number of triangles, each instance's counted.
     len: usize,
     kernel: Kernel,
 }
@@ -78,7 +86,7 @@ struct Node {
 
 impl Node {
     fn empty() -> Self {
-        Self { bounds: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3], child: [Child::of_block(0); 8] }
+        Self { bounds: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3], child: [Child::of_leaf(0); 8] }
     }
 
     fn set(&mut self, slot: usize, (low, high): (Vec3, Vec3), child: Child) {
@@ -88,34 +96,41 @@ impl Node {
         self.child[slot] = child;
     }
 
+    /// The bounds of a child.
+    fn corners(&self, slot: usize) -> (Vec3, Vec3) {
+        let corner = |side: usize| Vec3::from_array(self.bounds.map(|axis| axis[side][slot]));
+        (corner(0), corner(1))
+    }
+
     fn touches(&self, slot: usize, low: Vec3, high: Vec3) -> bool {
         let axes = self.bounds.iter().enumerate();
         axes.into_iter().all(|(axis, [lower, upper])| lower[slot] <= high[axis] && upper[slot] >= low[axis])
     }
 }
 
-/// The index of a node, or of a block of triangles where the highest bit is set.
+/// The index of a node, or of a leaf where the highest bit is set: that is a block of triangles or, beyond the last block, an
+/// instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 struct Child(u32);
 
 impl Child {
-    const BLOCK: u32 = 1 << 31;
+    const LEAF: u32 = 1 << 31;
 
     fn of_node(index: usize) -> Self {
         Self(index as u32)
     }
 
-    fn of_block(index: usize) -> Self {
-        Self(index as u32 | Self::BLOCK)
+    fn of_leaf(index: usize) -> Self {
+        Self(index as u32 | Self::LEAF)
     }
 
     #[inline(always)]
-    fn block(self) -> Option<usize> {
-        (self.0 & Self::BLOCK != 0).then_some((self.0 & !Self::BLOCK) as usize)
+    fn leaf(self) -> Option<usize> {
+        (self.0 & Self::LEAF != 0).then_some((self.0 & !Self::LEAF) as usize)
     }
 
-    /// The index, if it is no block's.
+    /// The index, if it is no leaf's.
     #[inline(always)]
     fn node(self) -> usize {
         self.0 as usize
@@ -170,9 +185,19 @@ impl Bvh {
     /// order.
     #[inline]
     pub fn closest_where(&self, ray: &Ray, counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
+        if self.instances.is_empty() {
+            self.closest_in::<false>(ray, counts)
+        } else {
+            self.closest_in::<true>(ray, counts)
+        }
+    }
+
+    #[inline]
+    fn closest_in<const INSTANCES: bool>(&self, ray: &Ray, counts: impl FnMut(&Hit) -> bool) -> Option<Hit> {
         match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(avx2) => avx2.closest(self, ray, counts),
+            Instructions::Avx2(avx2) => avx2.closest::<INSTANCES>(self, ray, counts),
+            Instructions::Portable if INSTANCES => two_levels::closest(Portable, self, ray, counts),
             Instructions::Portable => traverse::closest(Portable, self, ray, counts),
         }
     }
@@ -185,9 +210,23 @@ impl Bvh {
     /// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
     #[inline]
     pub fn visit(&self, ray: &Ray, visitor: impl FnMut(Hit) -> ControlFlow<()>) -> bool {
+        if self.instances.is_empty() {
+            self.visit_in::<false>(ray, visitor)
+        } else {
+            self.visit_in::<true>(ray, visitor)
+        }
+    }
+
+    #[inline]
+    fn visit_in<const INSTANCES: bool>(
+        &self,
+        ray: &Ray,
+        visitor: impl FnMut(Hit) -> ControlFlow<()>,
+    ) -> bool {
         match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(avx2) => avx2.visit(self, ray, visitor),
+            Instructions::Avx2(avx2) => avx2.visit::<INSTANCES>(self, ray, visitor),
+            Instructions::Portable if INSTANCES => two_levels::visit(Portable, self, ray, visitor),
             Instructions::Portable => traverse::visit(Portable, self, ray, visitor),
         }
     }
@@ -196,15 +235,14 @@ impl Bvh {
     pub fn visit_box(&self, low: Vec3, high: Vec3, mut visitor: impl FnMut(u32)) {
         let mut pending = vec![self.root];
         while let Some(child) = pending.pop() {
-            let Some(block) = child.block() else {
+            let Some(leaf) = child.leaf() else {
                 let node = &self.nodes[child.node()];
                 pending.extend((0..8).filter(|&k| node.touches(k, low, high)).map(|k| node.child[k]));
                 continue;
             };
-            for (id, [a, b, c]) in self.blocks[block].triangles() {
-                if a.min(b).min(c).cmple(high).all() && a.max(b).max(c).cmpge(low).all() {
-                    visitor(id);
-                }
+            match self.instance(leaf) {
+                Some(instance) => self.visit_box_inside(instance, (low, high), &mut visitor),
+                None => self.blocks[leaf].visit_box(low, high, &mut visitor),
             }
         }
     }
@@ -220,7 +258,7 @@ impl Bvh {
         self.kernel
     }
 
-    /// The number of triangles.
+    /// The number of triangles, each instance's counted.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -232,6 +270,6 @@ impl Bvh {
 
     /// What the tree takes, its triangles included.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
+        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.instances[..])
     }
 }

@@ -1,5 +1,7 @@
 //! What rays find, against brute force and against the other kernel.
 
+mod instances;
+
 use super::*;
 use crate::math::hash::{combine, mix64, unit_f32};
 use crate::math::warp;
@@ -300,7 +302,7 @@ fn hits_do_not_depend_on_the_shape_of_the_tree() {
 /// The levels of inner nodes, once it is clear that every triangle is in the tree, once, and inside all boxes above it.
 fn levels(bvh: &Bvh) -> usize {
     fn below(bvh: &Bvh, child: Child, (low, high): (Vec3, Vec3), seen: &mut [u32]) -> usize {
-        if let Some(block) = child.block() {
+        if let Some(block) = child.leaf() {
             for (id, corners) in bvh.blocks[block].triangles() {
                 seen[id as usize] += 1;
                 assert!(corners.iter().all(|p| p.cmpge(low).all() && p.cmple(high).all()));

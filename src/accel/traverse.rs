@@ -1,4 +1,4 @@
-//! How a ray finds its way through the tree.
+//! How a ray finds its way through a tree without instances.
 
 use std::ops::ControlFlow;
 
@@ -11,15 +11,15 @@ use super::{Bvh, Child, Hit, Node, Ray};
 /// The levels of inner nodes that a tree may have; the build sees to it.
 pub(super) const MOST_LEVELS: usize = 26;
 
-/// Each level on the way down leaves at most seven children behind.
-const STACK: usize = 7 * MOST_LEVELS + 1;
+/// Each level on the way down leaves at most seven children behind; one more level joins two trees.
+pub(super) const STACK: usize = 7 * (MOST_LEVELS + 1) + 1;
 
 /// The far plane is moved out by this factor, so that rounding never makes a ray miss a box it grazes (Ize 2013, "Robust BVH
 /// Ray Traversal", JCGT 2:2): 1 + 2γ(3).
-const ROBUST_FAR: f32 = 1.000_000_4;
+pub(super) const ROBUST_FAR: f32 = 1.000_000_4;
 
 /// A ray made ready for eight boxes at a time.
-struct Beam<L: Lanes> {
+pub(super) struct Beam<L: Lanes> {
     origin: [L::Floats; 3],
     inverse: [L::Floats; 3],
     /// Whether it runs towards smaller coordinates.
@@ -29,7 +29,7 @@ struct Beam<L: Lanes> {
 impl<L: Lanes> Beam<L> {
     /// None for a ray that isn't finite, which hits nothing.
     #[inline(always)]
-    fn new(lanes: L, ray: &Ray) -> Option<Self> {
+    pub(super) fn new(lanes: L, ray: &Ray) -> Option<Self> {
         if !(ray.origin.is_finite() && ray.direction.is_finite()) {
             return None;
         }
@@ -48,7 +48,7 @@ impl Node {
     /// A direction component of 0 makes 0·∞ = NaN where the origin lies in the plane of a face: minimum and maximum then take
     /// their second operand, and the slab does not cut.
     #[inline(always)]
-    fn enter<L: Lanes>(&self, lanes: L, ray: &Beam<L>, t_max: f32) -> (L::Floats, u32) {
+    pub(super) fn enter<L: Lanes>(&self, lanes: L, ray: &Beam<L>, t_max: f32) -> (L::Floats, u32) {
         let [near_x, far_x] = self.slab(lanes, ray, 0);
         let [near_y, far_y] = self.slab(lanes, ray, 1);
         let [near_z, far_z] = self.slab(lanes, ray, 2);
@@ -68,7 +68,7 @@ impl Node {
 }
 
 /// A child and where the ray enters it, which is never negative, so that keys sort by the entry.
-fn key(entry: f32, child: Child) -> u64 {
+pub(super) fn key(entry: f32, child: Child) -> u64 {
     u64::from(entry.to_bits()) << 32 | u64::from(child.0)
 }
 
@@ -89,9 +89,9 @@ pub(super) fn closest<L: Lanes>(
     let mut pending = ArrayVec::<u64, STACK>::new();
     let mut child = bvh.root;
     loop {
-        if let Some(block) = child.block() {
+        if let Some(leaf) = child.leaf() {
             let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
-            let _ = bvh.blocks[block].each_hit(lanes, sheared, t_max, |hit| {
+            let _ = bvh.blocks[leaf].each_hit(lanes, sheared, t_max, |hit| {
                 let is_nearer = hit.t < t_max || (hit.t == t_max && hit.triangle < rival);
                 if is_nearer && counts(&hit) {
                     (t_max, rival) = (hit.t, hit.triangle);
@@ -154,9 +154,9 @@ pub(super) fn visit<L: Lanes>(
     let mut pending = ArrayVec::<Child, STACK>::new();
     let mut child = bvh.root;
     loop {
-        if let Some(block) = child.block() {
+        if let Some(leaf) = child.leaf() {
             let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
-            let went_through = bvh.blocks[block].each_hit(lanes, sheared, ray.t_max, |hit| {
+            let went_through = bvh.blocks[leaf].each_hit(lanes, sheared, ray.t_max, |hit| {
                 if hit.t < ray.t_max { visitor(hit) } else { ControlFlow::Continue(()) }
             });
             if went_through.is_break() {

@@ -1,5 +1,10 @@
 //! All triangles of a scene in world space, with the way back from a triangle to its mesh.
+//!
+//! Triangles count by instance, in the order of their meshes. Those of instances that share their mesh ([`super::sharing`]) are worked out
+//! when they are asked for, by the operations that make copies, so that a picture is the same bits either way.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{Affine3A, DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
@@ -7,8 +12,10 @@ use rayon::prelude::*;
 
 use super::RenderError;
 use super::offset::Departure;
-use crate::accel::{Bvh, Hit, Kernel, Ray};
-use crate::scene::{MaterialId, Mesh, Scene};
+use super::sharing::{self, Saved};
+use crate::accel::{BuildError, Bvh, Hit, Kernel, Placement, Ray, Shared};
+use crate::scene::{Instance, MaterialId, Mesh, MeshId, Scene};
+use crate::settings::Use;
 
 /// The triangles of a scene and the tree over them. It depends on meshes and instances alone, so that jobs that differ in
 /// materials, lights or camera share it.
@@ -19,10 +26,15 @@ use crate::scene::{MaterialId, Mesh, Scene};
 pub struct Geometry {
     pub(super) bvh: Bvh,
     origin: Vec3,
+    /// Of the instances that have copies.
     triangles: Vec<Triangle>,
-    /// The instance and the triangle's index in its mesh.
+    /// The instance and the triangle's index in its mesh. Nothing where instances share meshes: it is searched for among them.
     origins: Vec<(u32, u32)>,
     instances: Vec<PlacedMesh>,
+    /// The instances that share their mesh, by index, ascending.
+    placements: Vec<(u32, Placement)>,
+    /// What they save.
+    saved: Saved,
     /// The centre, relative to [`Self::origin`], and the radius, at least a tiny one, of a sphere around everything.
     pub(super) sphere: (Vec3, f32),
 }
@@ -30,6 +42,11 @@ pub struct Geometry {
 #[derive(Clone, Debug)]
 struct PlacedMesh {
     mesh: Arc<Mesh>,
+    id: MeshId,
+    /// The index of its first triangle.
+    first: u32,
+    /// Where its copies begin, unless it shares its mesh.
+    copies: Option<u32>,
     world_from_object: Affine3A,
     /// The inverse transpose: takes object normals to world.
     normal_matrix: Mat3,
@@ -67,6 +84,15 @@ impl Triangle {
             extent: edges.map(|edge| edge.abs().max_element() as f32).into_iter().fold(0.0, f32::max),
         }
     }
+
+    /// A position, and a bound of how far rays must stay from the plane: see the room `offset`.
+    #[inline]
+    fn at(&self, [_, b1, b2]: [f32; 3]) -> (Vec3, f32) {
+        let [a, b, c] = self.vertices;
+        let (e1, e2) = (b - a, c - a);
+        let point = a + (e1 * b1 + e2 * b2);
+        (point, super::offset::bound(point, self.extent))
+    }
 }
 
 /// The corner data of a hit triangle, interpolated on demand.
@@ -76,43 +102,68 @@ pub(super) struct TrianglePoint<'a> {
     /// In its mesh.
     index: u32,
     barycentric: [f32; 3],
-    triangle: &'a Triangle,
+    /// None of an instance without copies.
+    copy: Option<&'a Triangle>,
+}
+
+impl PlacedMesh {
+    fn triangle_count(&self) -> u32 {
+        self.mesh.triangles.len() as u32
+    }
+
+    /// The vertices of the triangle at an index in the mesh, in a scene around the origin.
+    fn vertices(&self, index: u32) -> [Vec3; 3] {
+        let corners = self.mesh.triangles[index as usize];
+        corners.map(|c| self.world_from_object.transform_point3(self.mesh.positions[c as usize]))
+    }
+
+    /// The triangle at an index in the mesh, of which there may be a copy.
+    #[inline]
+    fn triangle<'a>(&self, index: u32, copy: Option<&'a Triangle>) -> Cow<'a, Triangle> {
+        match copy {
+            Some(triangle) => Cow::Borrowed(triangle),
+            None => Cow::Owned(Triangle::new(self.vertices(index), self.handedness)),
+        }
+    }
 }
 
 impl Geometry {
-    /// Flattens the scene's instances and builds the tree.
+    /// Builds the tree over the scene's instances, of copies or shared meshes, whichever serves better.
     ///
     /// # Errors
     /// [`RenderError::Build`] where there are too many triangles.
     pub fn build<M>(scene: &Scene<M>) -> Result<Self, RenderError> {
-        let count = scene.triangle_count();
-        let mut vertices = Vec::with_capacity(count);
-        let mut origins = Vec::with_capacity(count);
-        let mut instances = Vec::with_capacity(scene.instances.len());
+        Self::sharing(scene, Use::Auto)
+    }
+
+    /// As [`Self::build`], with meshes shared as told. Where positions are relative to another origin than the world's, all instances
+    /// have copies: they are placed in f64, which trees are not traversed in.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn sharing<M>(scene: &Scene<M>, sharing: Use) -> Result<Self, RenderError> {
+        BuildError::check(scene.triangle_count())?;
         let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
         let center = low * 0.5 + high * 0.5;
         let radius = radius_of(high - center);
         let origin = if center.abs().max_element() > FAR * radius { center } else { Vec3::ZERO };
-        for (i, instance) in scene.instances.iter().enumerate() {
-            let mesh = &scene.meshes[instance.mesh.0 as usize];
-            let to_world = instance.world_from_object;
-            let place = |p: Vec3| {
-                if origin == Vec3::ZERO {
-                    to_world.transform_point3(p)
+        let mut instances = placed_meshes(scene);
+        let firsts: Vec<u32> = instances.iter().map(|placed| placed.first).collect();
+        let sharing = if origin == Vec3::ZERO { sharing } else { Use::Never };
+        let (placements, saved) = sharing::shared(scene, &firsts, sharing);
+        let count = number_copies(&mut instances, &placements);
+        let (mut vertices, mut origins) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for (i, placed) in instances.iter().enumerate().filter(|(_, placed)| placed.copies.is_some()) {
+            for (k, corners) in placed.mesh.triangles.iter().enumerate() {
+                vertices.push(if origin == Vec3::ZERO {
+                    placed.vertices(k as u32)
                 } else {
-                    placed_from(origin, &to_world, p)
-                }
-            };
-            for (k, corners) in mesh.triangles.iter().enumerate() {
-                vertices.push(corners.map(|c| place(mesh.positions[c as usize])));
+                    corners.map(|c| {
+                        placed_from(origin, &placed.world_from_object, placed.mesh.positions[c as usize])
+                    })
+                });
                 origins.push((i as u32, k as u32));
             }
-            instances.push(PlacedMesh {
-                mesh: Arc::clone(mesh),
-                world_from_object: to_world,
-                normal_matrix: Mat3::from(to_world.matrix3).inverse().transpose(),
-                handedness: if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
-            });
         }
         let triangles = vertices
             .par_iter()
@@ -121,12 +172,17 @@ impl Geometry {
                 Triangle::new(vertices, instances[instance as usize].handedness)
             })
             .collect();
+        if !placements.is_empty() {
+            origins = Vec::new();
+        }
         Ok(Self {
-            bvh: Bvh::build(&vertices)?,
+            bvh: tree_over(&vertices, &instances, &placements)?,
             origin,
             triangles,
             origins,
             instances,
+            placements,
+            saved,
             sphere: (center - origin, radius),
         })
     }
@@ -157,14 +213,28 @@ impl Geometry {
         Self { bvh: self.bvh.with_kernel(kernel), ..self }
     }
 
-    /// The corners of all triangles, relative to [`Self::origin`].
+    /// The corners of all triangles, those of instances without copies too, relative to [`Self::origin`].
     pub fn corners(&self) -> Vec<[Vec3; 3]> {
-        self.triangles.iter().map(|triangle| triangle.vertices).collect()
+        (0..self.triangle_count() as u32).map(|triangle| self.vertices(triangle)).collect()
+    }
+
+    /// The tree built anew.
+    ///
+    /// # Errors
+    /// None that the first one had not.
+    pub fn rebuilt_tree(&self) -> Result<Bvh, RenderError> {
+        let copies: Vec<_> = self.triangles.iter().map(|triangle| triangle.vertices).collect();
+        Ok(tree_over(&copies, &self.instances, &self.placements)?)
     }
 
     /// The number of triangles, instances counted.
     pub fn triangle_count(&self) -> usize {
-        self.triangles.len()
+        self.bvh.len()
+    }
+
+    /// What sharing meshes saves.
+    pub(super) fn saved(&self) -> Saved {
+        self.saved
     }
 
     /// -1 where a triangle's front is on the other side than its winding says.
@@ -173,13 +243,34 @@ impl Geometry {
     }
 
     /// The instance of a triangle.
+    #[inline]
     pub(super) fn instance_of(&self, triangle: u32) -> usize {
-        self.origins[triangle as usize].0 as usize
+        self.find(triangle).0
     }
 
     /// World positions, in the order that barycentric coordinates count.
     pub(super) fn vertices(&self, triangle: u32) -> [Vec3; 3] {
-        self.triangles[triangle as usize].vertices
+        let (instance, index, copy) = self.find(triangle);
+        copy.map_or_else(|| self.instances[instance].vertices(index), |triangle| triangle.vertices)
+    }
+
+    /// The instance, the index in its mesh and the copy of a triangle.
+    #[inline]
+    fn find(&self, triangle: u32) -> (usize, u32, Option<&Triangle>) {
+        match self.origins.get(triangle as usize) {
+            Some(&(instance, index)) => (instance as usize, index, Some(&self.triangles[triangle as usize])),
+            None => self.search(triangle),
+        }
+    }
+
+    /// [`Self::find`] where instances share meshes.
+    #[inline(never)]
+    fn search(&self, triangle: u32) -> (usize, u32, Option<&Triangle>) {
+        // Of several that begin there, all but the last are empty.
+        let instance = self.instances.partition_point(|placed| placed.first <= triangle) - 1;
+        let placed = &self.instances[instance];
+        let index = triangle - placed.first;
+        (instance, index, placed.copies.map(|start| &self.triangles[(start + index) as usize]))
     }
 
     /// Triangles with their instance's material.
@@ -187,7 +278,10 @@ impl Geometry {
         &'a self,
         scene: &'a Scene<M>,
     ) -> impl Iterator<Item = (u32, MaterialId)> + 'a {
-        self.origins.iter().enumerate().map(|(t, &(i, _))| (t as u32, scene.instances[i as usize].material))
+        self.instances.iter().zip(&scene.instances).flat_map(|(placed, instance)| {
+            let triangles = placed.first..placed.first + placed.triangle_count();
+            triangles.map(|triangle| (triangle, instance.material))
+        })
     }
 
     /// The data at a hit.
@@ -199,10 +293,67 @@ impl Geometry {
     /// The data at a point of a triangle.
     #[inline]
     pub(super) fn point_on(&self, triangle: u32, barycentric: [f32; 3]) -> TrianglePoint<'_> {
-        let (instance, index) = self.origins[triangle as usize];
-        let placed = &self.instances[instance as usize];
-        TrianglePoint { placed, index, barycentric, triangle: &self.triangles[triangle as usize] }
+        let (instance, index, copy) = self.find(triangle);
+        TrianglePoint { placed: &self.instances[instance], index, barycentric, copy }
     }
+}
+
+/// The scene's instances, all of them without copies.
+fn placed_meshes<M>(scene: &Scene<M>) -> Vec<PlacedMesh> {
+    let mut first = 0;
+    let mut placed = |instance: &Instance| {
+        let (mesh, to_world) = (&scene.meshes[instance.mesh.0 as usize], instance.world_from_object);
+        let placed = PlacedMesh {
+            mesh: Arc::clone(mesh),
+            id: instance.mesh,
+            first,
+            copies: None,
+            world_from_object: to_world,
+            normal_matrix: Mat3::from(to_world.matrix3).inverse().transpose(),
+            handedness: if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
+        };
+        first += placed.triangle_count();
+        placed
+    };
+    scene.instances.iter().map(&mut placed).collect()
+}
+
+/// Says where the copies of those begin that have no placement; tells how many there are.
+fn number_copies(instances: &mut [PlacedMesh], placements: &[(u32, Placement)]) -> usize {
+    let mut shared = placements.iter().map(|&(instance, _)| instance).peekable();
+    let mut count = 0;
+    for (i, placed) in (0..).zip(instances) {
+        if shared.next_if_eq(&i).is_none() {
+            placed.copies = Some(count);
+            count += placed.triangle_count();
+        }
+    }
+    count as usize
+}
+
+/// The tree over `copies` and the meshes that are placed.
+fn tree_over(
+    copies: &[[Vec3; 3]],
+    instances: &[PlacedMesh],
+    placements: &[(u32, Placement)],
+) -> Result<Bvh, BuildError> {
+    if placements.is_empty() {
+        return Bvh::build(copies);
+    }
+    let copied = instances.iter().filter(|placed| placed.copies.is_some());
+    let indices: Vec<u32> = copied.flat_map(|p| p.first..p.first + p.triangle_count()).collect();
+    let mut shared = BTreeMap::new();
+    for &(instance, placement) in placements {
+        let placed = &instances[instance as usize];
+        let mesh = shared.entry(placed.id).or_insert_with(|| {
+            let position = |c: u32| placed.mesh.positions[c as usize];
+            let triangles = placed.mesh.triangles.iter().map(|corners| corners.map(position)).collect();
+            Shared { triangles, placements: Vec::new() }
+        });
+        mesh.placements.push(placement);
+    }
+    let shared: Vec<_> = shared.into_values().collect();
+    Bvh::with_instances(copies, |copy| indices[copy as usize], &shared)
 }
 
 /// A scene lies far from the origin if its centre is more than this many of its radii away along an axis.
@@ -227,27 +378,30 @@ impl TrianglePoint<'_> {
     /// The position, and a bound of how far rays must stay from the plane of its triangle: see the room `offset`.
     #[inline]
     pub(super) fn position(&self) -> (Vec3, f32) {
-        let [a, b, c] = self.triangle.vertices;
-        let (e1, e2) = (b - a, c - a);
-        let point = a + (e1 * self.barycentric[1] + e2 * self.barycentric[2]);
-        (point, super::offset::bound(point, self.triangle.extent))
+        self.triangle().at(self.barycentric)
+    }
+
+    #[inline]
+    fn triangle(&self) -> Cow<'_, Triangle> {
+        self.placed.triangle(self.index, self.copy)
     }
 
     /// The unit geometric normal of the front side. None where the triangle has no area.
     #[inline]
     pub(super) fn geometric_normal(&self) -> Option<Vec3> {
-        let normal = self.triangle.normal;
+        let normal = self.triangle().normal;
         (normal != Vec3::ZERO).then_some(normal)
     }
 
     /// From where rays leave the point that `incoming` hit.
     #[inline(always)]
     pub(super) fn departure(&self, geometry: &Geometry, incoming: &Ray, hit: &Hit) -> Departure {
-        let (point, error) = self.position();
-        let [h0, h1, h2] = self.triangle.heights;
+        let triangle = self.triangle();
+        let (point, error) = triangle.at(self.barycentric);
+        let [h0, h1, h2] = triangle.heights;
         // A triangle thinner than rounding moves its corners has no plane to speak of: any normal is right that faces the viewer.
         let has_plane = h0.min(h1).min(h2) > super::offset::THINNEST * error;
-        let normal = if has_plane { self.triangle.normal } else { -incoming.direction };
+        let normal = if has_plane { triangle.normal } else { -incoming.direction };
         let mut departure = Departure::new(hit.triangle, point, error, normal, incoming);
         // A barycentric coordinate is the distance from an edge in heights above it.
         let [b0, b1, b2] = self.barycentric;
@@ -302,7 +456,7 @@ impl TrianglePoint<'_> {
         let uvs = mesh.uvs.get(set as usize)?;
         let [t0, t1, t2] = self.corners().map(|c| uvs[c]);
         let (d1, d2) = (t1 - t0, t2 - t0);
-        let [a, b, c] = self.triangle.vertices;
+        let [a, b, c] = self.triangle().vertices;
         let (e1, e2) = (b - a, c - a);
         let det = d1.perp_dot(d2);
         let tangent = ((e1 * d2.y - e2 * d1.y) * det.signum()).try_normalize()?;

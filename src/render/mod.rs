@@ -19,6 +19,7 @@ mod pilot;
 mod prepare;
 mod probe;
 mod range;
+mod sharing;
 mod skipped;
 mod surface;
 mod techniques;

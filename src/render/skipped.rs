@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::Prepared;
 use super::material::{PreparedMaterial, constant_bsdf};
+use super::sharing::Saved;
 use crate::disney::{Lobe, Model, Parameter};
 use crate::scene::material::{Material, Param};
 
@@ -22,6 +23,7 @@ impl Prepared {
             ));
         }
         skipped.extend(self.unused_images());
+        skipped.extend(self.spared_copies());
         if self.all_covered {
             skipped.push("opacity: every surface is opaque".to_owned());
         }
@@ -43,6 +45,16 @@ impl Prepared {
         (undecoded > 0).then(|| match undecoded {
             1 => "textures: an image that nothing samples is not decoded".to_owned(),
             more => format!("textures: {more} images that nothing samples are not decoded"),
+        })
+    }
+
+    fn spared_copies(&self) -> Option<String> {
+        let Saved { instances, meshes, bytes, copied_bytes } = self.geometry.saved();
+        let megabytes = |bytes: usize| bytes.div_ceil(1_000_000);
+        (instances > 0).then(|| {
+            let (meshes, bytes, copied) = (meshes, megabytes(bytes), megabytes(copied_bytes));
+            let of = if meshes == 1 { "a mesh".to_owned() } else { format!("{meshes} meshes") };
+            format!("copies of meshes: {instances} instances of {of} take {bytes} MB instead of {copied} MB")
         })
     }
 

@@ -5,25 +5,7 @@ use std::io::Write;
 
 use serde_json::{Value, json};
 
-use crate::support::{Desk, PROGRAM, Run, SMALL_ARGUMENTS, SQUARE, repository};
-
-/// The address space that a run may take above its input's: 200 MB, and what the program takes anyway.
-const MEMORY: usize = 320 << 20;
-
-/// Runs `pipeline`, which may ask for `MEMORY` and as much again as `explained`, and ends when asked for more.
-fn confined(desk: &Desk, explained: usize, arguments: &[&str]) -> Run {
-    let limit = (MEMORY + explained) >> 10;
-    // glibc sets 64 MiB of addresses aside for each thread unless it is told otherwise.
-    let script = format!("ulimit -v {limit} && MALLOC_ARENA_MAX=1 exec \"$0\" \"$@\"");
-    let mut shell = assert_cmd::Command::new("sh");
-    shell.current_dir(desk.path("")).args(["-c", &script, PROGRAM, "--threads", "2"]).args(arguments);
-    let output = shell.timeout(std::time::Duration::from_secs(120)).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    let (stdout, stderr) = (text(output.stdout), text(output.stderr));
-    let code = output.status.code().unwrap_or_else(|| panic!("{arguments:?} was killed: {stderr}"));
-    assert!(!stderr.contains("panicked"), "{stderr}");
-    Run { code, stdout, stderr }
-}
+use crate::support::{Desk, Run, SMALL_ARGUMENTS, SQUARE, confined, repository};
 
 /// `pipeline render` of a small picture.
 fn render(desk: &Desk, scene: &str, more: &[&str]) -> Run {

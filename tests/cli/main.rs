@@ -14,6 +14,7 @@ mod determinism;
 mod diff;
 mod failures;
 mod inspect;
+mod instances;
 mod manifests;
 mod references;
 mod render;
