@@ -3,7 +3,6 @@
 //! Triangles count by instance, in the order of their meshes. Those of instances that share their mesh ([`super::sharing`]) are worked out
 //! when they are asked for, by the operations that make copies, so that a picture is the same bits either way.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -115,15 +114,6 @@ impl PlacedMesh {
     fn vertices(&self, index: u32) -> [Vec3; 3] {
         let corners = self.mesh.triangles[index as usize];
         corners.map(|c| self.world_from_object.transform_point3(self.mesh.positions[c as usize]))
-    }
-
-    /// The triangle at an index in the mesh, of which there may be a copy.
-    #[inline]
-    fn triangle<'a>(&self, index: u32, copy: Option<&'a Triangle>) -> Cow<'a, Triangle> {
-        match copy {
-            Some(triangle) => Cow::Borrowed(triangle),
-            None => Cow::Owned(Triangle::new(self.vertices(index), self.handedness)),
-        }
     }
 }
 
@@ -378,30 +368,40 @@ impl TrianglePoint<'_> {
     /// The position, and a bound of how far rays must stay from the plane of its triangle: see the room `offset`.
     #[inline]
     pub(super) fn position(&self) -> (Vec3, f32) {
-        self.triangle().at(self.barycentric)
+        self.ask(|triangle| triangle.at(self.barycentric))
     }
 
-    #[inline]
-    fn triangle(&self) -> Cow<'_, Triangle> {
-        self.placed.triangle(self.index, self.copy)
+    /// What the triangle answers.
+    #[inline(always)]
+    fn ask<R>(&self, question: impl FnOnce(&Triangle) -> R) -> R {
+        match self.copy {
+            Some(triangle) => question(triangle),
+            None => self.ask_placed(question),
+        }
+    }
+
+    /// [`Self::ask`] of one that has no copy: out of line, so that scenes of copies, which are most, have short code.
+    #[cold]
+    #[inline(never)]
+    fn ask_placed<R>(&self, question: impl FnOnce(&Triangle) -> R) -> R {
+        question(&Triangle::new(self.placed.vertices(self.index), self.placed.handedness))
     }
 
     /// The unit geometric normal of the front side. None where the triangle has no area.
     #[inline]
     pub(super) fn geometric_normal(&self) -> Option<Vec3> {
-        let normal = self.triangle().normal;
+        let normal = self.ask(|triangle| triangle.normal);
         (normal != Vec3::ZERO).then_some(normal)
     }
 
     /// From where rays leave the point that `incoming` hit.
     #[inline(always)]
     pub(super) fn departure(&self, geometry: &Geometry, incoming: &Ray, hit: &Hit) -> Departure {
-        let triangle = self.triangle();
-        let (point, error) = triangle.at(self.barycentric);
-        let [h0, h1, h2] = triangle.heights;
+        let of_triangle = |t: &Triangle| (t.at(self.barycentric), t.normal, t.heights);
+        let ((point, error), normal, [h0, h1, h2]) = self.ask(of_triangle);
         // A triangle thinner than rounding moves its corners has no plane to speak of: any normal is right that faces the viewer.
         let has_plane = h0.min(h1).min(h2) > super::offset::THINNEST * error;
-        let normal = if has_plane { triangle.normal } else { -incoming.direction };
+        let normal = if has_plane { normal } else { -incoming.direction };
         let mut departure = Departure::new(hit.triangle, point, error, normal, incoming);
         // A barycentric coordinate is the distance from an edge in heights above it.
         let [b0, b1, b2] = self.barycentric;
@@ -456,7 +456,7 @@ impl TrianglePoint<'_> {
         let uvs = mesh.uvs.get(set as usize)?;
         let [t0, t1, t2] = self.corners().map(|c| uvs[c]);
         let (d1, d2) = (t1 - t0, t2 - t0);
-        let [a, b, c] = self.triangle().vertices;
+        let [a, b, c] = self.ask(|triangle| triangle.vertices);
         let (e1, e2) = (b - a, c - a);
         let det = d1.perp_dot(d2);
         let tangent = ((e1 * d2.y - e2 * d1.y) * det.signum()).try_normalize()?;
