@@ -73,7 +73,7 @@ pub(super) struct Arguments {
     /// The largest number of scattering events.
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
-    /// Independent sample sets a pixel, for the variance.
+    /// Independent sample sets a pixel, for the variance; one makes the least noise, and its halves tell the variance.
     #[arg(long, value_name = "N")]
     replicates: Option<u32>,
     /// The camera, by name.
