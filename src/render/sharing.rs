@@ -1,7 +1,7 @@
 //! Which meshes are in the tree once for all their instances.
 //!
 //! A copy of a mesh for each instance is faster to trace, and takes memory and time to build. So copies are made as long as they are
-//! few: meshes share only where copies would take more than [`MOST_COPIES`], and then those first that save the most.
+//! few: meshes share only where copies would take more than [`ALL_COPIES`], and then all but those that save the least.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +11,13 @@ use crate::accel::Placement;
 use crate::scene::{Mesh, Scene};
 use crate::settings::Use;
 
-/// What copies beyond the meshes themselves may take, in bytes: 3.6 million triangles, which are built in some seconds. While that is built,
-/// it is about three times as much.
-const MOST_COPIES: usize = 512 << 20;
+/// What copies beyond the meshes themselves may take, in bytes, for all to be copied: 3.6 million triangles, which are built in some seconds.
+/// While that is built, it is about three times as much.
+const ALL_COPIES: usize = 512 << 20;
+
+/// What they may take where some meshes share: rays through both are slow where copies lie among shared meshes, so that only small meshes
+/// are worth it.
+const SOME_COPIES: usize = 64 << 20;
 
 /// What a triangle of a copy takes, in bytes: itself, its origin and its part of the tree. The last is all that it takes in a shared mesh.
 const OF_COPY: usize = 64 + 8 + OF_TREE;
@@ -62,10 +66,12 @@ pub(super) fn shared<M>(scene: &Scene<M>, firsts: &[u32], sharing: Use) -> (Vec<
     if sharing == Use::Auto {
         candidates.retain(|candidate| candidate.placed.len() > 1 && candidate.saving() > 0);
         candidates.sort_by_key(Candidate::saving);
+        let all: usize = candidates.iter().map(Candidate::saving).sum();
+        let most = if all > ALL_COPIES { SOME_COPIES } else { ALL_COPIES };
         let mut copies = 0;
         candidates.retain(|candidate| {
             copies += candidate.saving();
-            copies > MOST_COPIES
+            copies > most
         });
     }
     let saved = Saved {
