@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{cube, emitting, lambert, scene, set_sky, small, sphere, square};
+use common::{cube, disney, emitting, glass, lambert, metal, scene, set_sky, small, sphere, square};
 use glam::{Vec2, Vec3};
 use pipeline::color::Rgb;
 use pipeline::disney::{Model, Parameter};
@@ -14,23 +14,6 @@ use pipeline::scene::material::{NormalMap, Param, Sides, TextureChannel, Texture
 use pipeline::scene::texture::{Encoding, Image, Pixels, TexelFilter, Texture, Wrap};
 use pipeline::scene::{Camera, ImageId, Material, Mesh, Scene, TextureId};
 use pipeline::settings::{Filter, RenderSettings, Use};
-
-fn disney(scalars: &[(Parameter, f32)]) -> Material {
-    let mut material =
-        Material { base_color: Param::Constant(Rgb::new(0.9, 0.7, 0.5)), ..Material::default() };
-    for &(parameter, value) in scalars {
-        *material.scalar_mut(parameter) = Param::Constant(value);
-    }
-    material
-}
-
-fn metal(roughness: f32) -> Material {
-    disney(&[(Parameter::Metallic, 1.0), (Parameter::Roughness, roughness)])
-}
-
-fn glass(roughness: f32) -> Material {
-    disney(&[(Parameter::SpecTrans, 1.0), (Parameter::Roughness, roughness)])
-}
 
 /// A coarse ball with smooth normals: what it reflects is not reciprocal.
 fn ball(radius: f32, center: Vec3) -> Mesh {

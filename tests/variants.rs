@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::{Arc, LazyLock};
 
-use common::{emitting, lambert, scene, set_sky, sphere, square};
+use common::{disney, emitting, glass, lambert, metal, scene, set_sky, sphere, square};
 use glam::Vec3;
 use pipeline::color::Rgb;
 use pipeline::disney::{Model, Parameter};
@@ -16,23 +16,6 @@ use pipeline::settings::{Integrator, RenderSettings, Use};
 
 /// The material that varies.
 const BALL: usize = 1;
-
-fn disney(scalars: &[(Parameter, f32)]) -> Material {
-    let mut material =
-        Material { base_color: Param::Constant(Rgb::new(0.9, 0.7, 0.5)), ..Material::default() };
-    for &(parameter, value) in scalars {
-        *material.scalar_mut(parameter) = Param::Constant(value);
-    }
-    material
-}
-
-fn metal(roughness: f32) -> Material {
-    disney(&[(Parameter::Metallic, 1.0), (Parameter::Roughness, roughness)])
-}
-
-fn glass(roughness: f32) -> Material {
-    disney(&[(Parameter::SpecTrans, 1.0), (Parameter::Roughness, roughness)])
-}
 
 fn ball(center: Vec3, radius: f32) -> Mesh {
     let mut mesh = sphere(radius, center, 6);

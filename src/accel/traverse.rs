@@ -68,8 +68,52 @@ impl Node {
 }
 
 /// A child and where the ray enters it, which is never negative, so that keys sort by the entry.
-pub(super) fn key(entry: f32, child: Child) -> u64 {
+fn key(entry: f32, child: Child) -> u64 {
     u64::from(entry.to_bits()) << 32 | u64::from(child.0)
+}
+
+impl Node {
+    /// The nearest of the children that are `entered`, at least one; the others wait, the nearer on top.
+    #[inline(always)]
+    pub(super) fn nearest_first(
+        &self,
+        entry: [f32; 8],
+        mut entered: u32,
+        pending: &mut ArrayVec<u64, STACK>,
+    ) -> Child {
+        let mut next = || {
+            let lane = entered.trailing_zeros() as usize % 8;
+            entered &= entered - 1;
+            (entered, key(entry[lane], self.child[lane]))
+        };
+        let (mut rest, mut first) = next();
+        let bottom = pending.len();
+        while rest != 0 {
+            let (left, other) = next();
+            rest = left;
+            let farther = first.max(other);
+            first = first.min(other);
+            pending.push(farther);
+            let mut at = pending.len() - 1;
+            while at > bottom && pending[at - 1] < farther {
+                pending[at] = pending[at - 1];
+                at -= 1;
+            }
+            pending[at] = farther;
+        }
+        Child(first as u32)
+    }
+}
+
+/// What waits on top; what begins behind `t_max` is left out.
+#[inline(always)]
+pub(super) fn next_before(t_max: f32, pending: &mut ArrayVec<u64, STACK>) -> Option<Child> {
+    loop {
+        let key = pending.pop()?;
+        if f32::from_bits((key >> 32) as u32) <= t_max {
+            return Some(Child(key as u32));
+        }
+    }
 }
 
 /// The nearest of the hits that `counts`, among equally near ones the one of the lowest index.
@@ -101,41 +145,16 @@ pub(super) fn closest<L: Lanes>(
             });
         } else {
             let node = &bvh.nodes[child.node()];
-            let (entry, mut entered) = node.enter(lanes, &beam, t_max);
+            let (entry, entered) = node.enter(lanes, &beam, t_max);
             if entered != 0 {
-                let entry = entry.to_array();
-                let mut next = || {
-                    let lane = entered.trailing_zeros() as usize % 8;
-                    entered &= entered - 1;
-                    (entered, key(entry[lane], node.child[lane]))
-                };
-                let (mut rest, mut first) = next();
-                // The nearest goes on; the others wait, the nearer on top.
-                let bottom = pending.len();
-                while rest != 0 {
-                    let (left, other) = next();
-                    rest = left;
-                    let farther = first.max(other);
-                    first = first.min(other);
-                    pending.push(farther);
-                    let mut at = pending.len() - 1;
-                    while at > bottom && pending[at - 1] < farther {
-                        pending[at] = pending[at - 1];
-                        at -= 1;
-                    }
-                    pending[at] = farther;
-                }
-                child = Child(first as u32);
+                child = node.nearest_first(entry.to_array(), entered, &mut pending);
                 continue;
             }
         }
-        // What begins behind the nearest hit is left out.
-        child = loop {
-            let Some(key) = pending.pop() else { return nearest };
-            if f32::from_bits((key >> 32) as u32) <= t_max {
-                break Child(key as u32);
-            }
-        };
+        match next_before(t_max, &mut pending) {
+            Some(next) => child = next,
+            None => return nearest,
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use arrayvec::ArrayVec;
 use super::block::Block;
 use super::instance::Inside;
 use super::lanes::{Floats, Lanes};
-use super::traverse::{Beam, STACK, key};
+use super::traverse::{Beam, STACK, next_before};
 use super::triangle::ShearedRay;
 use super::{Bvh, Child, Hit, Node, Ray};
 
@@ -149,41 +149,16 @@ impl<C: FnMut(&Hit) -> bool> Query for Nearest<C> {
                 space.leaf(leaf, self)?;
             } else {
                 let node = &nodes[child.node()];
-                let (entry, mut entered) = space.enter(node, self.t_max);
+                let (entry, entered) = space.enter(node, self.t_max);
                 if entered != 0 {
-                    let entry = entry.to_array();
-                    let mut next = || {
-                        let lane = entered.trailing_zeros() as usize % 8;
-                        entered &= entered - 1;
-                        (entered, key(entry[lane], node.child[lane]))
-                    };
-                    let (mut rest, mut first) = next();
-                    // The nearest goes on; the others wait, the nearer on top.
-                    let bottom = pending.len();
-                    while rest != 0 {
-                        let (left, other) = next();
-                        rest = left;
-                        let farther = first.max(other);
-                        first = first.min(other);
-                        pending.push(farther);
-                        let mut at = pending.len() - 1;
-                        while at > bottom && pending[at - 1] < farther {
-                            pending[at] = pending[at - 1];
-                            at -= 1;
-                        }
-                        pending[at] = farther;
-                    }
-                    child = Child(first as u32);
+                    child = node.nearest_first(entry.to_array(), entered, &mut pending);
                     continue;
                 }
             }
-            // What begins behind the nearest hit is left out.
-            child = loop {
-                let Some(key) = pending.pop() else { return ControlFlow::Continue(()) };
-                if f32::from_bits((key >> 32) as u32) <= self.t_max {
-                    break Child(key as u32);
-                }
-            };
+            match next_before(self.t_max, &mut pending) {
+                Some(next) => child = next,
+                None => return ControlFlow::Continue(()),
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
 use pipeline::color::Rgb;
-use pipeline::disney::Model;
+use pipeline::disney::{Model, Parameter};
 use pipeline::render::{Control, Geometry, Prepared, Rendered, render};
 use pipeline::scene::environment::{Environment, EnvironmentMap, Equirectangular};
 use pipeline::scene::material::{Emission, Param, Sides};
@@ -18,6 +18,26 @@ use pipeline::settings::RenderSettings;
 /// A material that reflects `albedo` evenly.
 pub(crate) fn lambert(albedo: f32) -> Material {
     Material { model: Model::Diffuse, base_color: Param::Constant(Rgb::grey(albedo)), ..Material::default() }
+}
+
+/// A Disney material of one colour with these parameters.
+pub(crate) fn disney(scalars: &[(Parameter, f32)]) -> Material {
+    let mut material =
+        Material { base_color: Param::Constant(Rgb::new(0.9, 0.7, 0.5)), ..Material::default() };
+    for &(parameter, value) in scalars {
+        *material.scalar_mut(parameter) = Param::Constant(value);
+    }
+    material
+}
+
+/// A rough metal.
+pub(crate) fn metal(roughness: f32) -> Material {
+    disney(&[(Parameter::Metallic, 1.0), (Parameter::Roughness, roughness)])
+}
+
+/// Rough glass.
+pub(crate) fn glass(roughness: f32) -> Material {
+    disney(&[(Parameter::SpecTrans, 1.0), (Parameter::Roughness, roughness)])
 }
 
 /// Puts `world` under a sky of one grey value a pixel, row by row from the top.
