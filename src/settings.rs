@@ -56,6 +56,10 @@ pub struct RenderSettings {
     /// Trace paths from the lights too, weighed against the others: they find what mirrors, glass and shiny things throw onto other surfaces.
     #[serde(skip_serializing_if = "is_default")]
     pub light_paths: Use,
+    /// Let neighbouring pixels use each other's paths from their second surfaces on: far less noise of indirect light, which is alike in blocks
+    /// of two by two pixels then.
+    #[serde(skip_serializing_if = "is_default")]
+    pub path_reuse: Use,
 }
 
 /// Whether a technique is used.
@@ -206,6 +210,7 @@ impl Default for RenderSettings {
             nee: true,
             mis: true,
             light_paths: Use::Auto,
+            path_reuse: Use::Auto,
         }
     }
 }

@@ -16,6 +16,8 @@ use pipeline::settings::{Integrator, RenderSettings, Use};
 
 /// The material that varies.
 const BALL: usize = 1;
+/// That of the veil.
+const VEIL: usize = 3;
 
 fn ball(center: Vec3, radius: f32) -> Mesh {
     let mut mesh = sphere(radius, center, 6);
@@ -52,7 +54,7 @@ fn build_world() -> Scene {
 }
 
 fn settings(light_paths: Use) -> RenderSettings {
-    RenderSettings { light_paths, ..common::small(40, 30, 8, 16) }
+    RenderSettings { light_paths, path_reuse: Use::Never, ..common::small(40, 30, 8, 16) }
 }
 
 /// Scenes of one geometry.
@@ -124,6 +126,22 @@ fn variants_have_the_bits_that_each_has_alone() {
         let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool(1).install(|| assert_the_same(&scenes));
         pool(3).install(|| assert_the_same(&scenes));
+    }
+}
+
+/// Blocks in which no path meets what differs are shared whole, of others the paths up to there.
+#[test]
+fn variants_that_reuse_paths_have_the_bits_that_each_has_alone() {
+    let mut looks = looks();
+    looks.iter_mut().for_each(|world| world.materials[VEIL].item.opacity = Opacity::default());
+    for light_paths in [Use::Never, Use::Always] {
+        for error in [None, Some(0.02)] {
+            let settings = RenderSettings { path_reuse: Use::Always, error, ..settings(light_paths) };
+            let scenes = prepared(&looks, &[settings]);
+            assert!(scenes.iter().all(Prepared::has_path_reuse));
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("threads");
+            pool.install(|| assert_the_same(&scenes));
+        }
     }
 }
 

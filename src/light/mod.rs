@@ -97,6 +97,14 @@ pub struct LightSample {
     pub pdf: f32,
 }
 
+impl LightSample {
+    /// The light has no extent: no other strategy finds it.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        matches!(self.place, LightPlace::Point { .. } | LightPlace::Far { is_delta: true, .. })
+    }
+}
+
 /// Where a light sample lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightPlace {

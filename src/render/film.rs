@@ -8,8 +8,9 @@ use rayon::prelude::*;
 
 use super::integrators::integrate;
 use super::light_image::LightImage;
-use super::path::{PathSample, ReplayVertex};
-use super::tile::{NAMED_BAD_SAMPLES, Pixel, Tile, levels};
+use super::path::PathSample;
+use super::replay::ReplayVertex;
+use super::tile::{Block, NAMED_BAD_SAMPLES, Pixel, Tile, levels};
 use super::variants::Variants;
 use super::{Prepared, RenderError};
 use crate::accel::Ray;
@@ -121,18 +122,19 @@ fn sample_up_to(
     }
     // They began together and go on together.
     let taken = tiles[any].samples;
-    for pixel in 0..tiles[any].area() as usize {
+    let blocks: Vec<Block> = tiles[any].blocks(variants.block_sides()).collect();
+    for block in &blocks {
         if control.stop.load(Ordering::Relaxed) {
             return Err(RenderError::Cancelled);
         }
-        let (x, y) = tiles[any].place(pixel);
         for sample in taken..samples {
-            variants.sample(&going, (x, y), sample, |variant, path, shared_rays| {
-                tiles[variant].add(pixel, sample, path);
+            variants.sample(&going, block, sample, |variant, place, path, shared_rays| {
+                tiles[variant].add(block[place], sample, path);
                 tiles[variant].shared_rays += shared_rays;
             });
         }
-        control.paths.fetch_add(u64::from(samples - taken) * going.len() as u64, Ordering::Relaxed);
+        let paths = u64::from(samples - taken) * (going.len() * block.len()) as u64;
+        control.paths.fetch_add(paths, Ordering::Relaxed);
     }
     for variant in going {
         let spared = tiles[variant].end(settings, samples, &lit[variant]);

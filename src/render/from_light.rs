@@ -37,8 +37,22 @@ impl FromLight {
     pub(super) fn arrive(&mut self, scene: &Prepared, camera_ray: &Ray, surface: &Surface<'_>) {
         if let (0, Ok(plan)) = (self.scatterings, &scene.light_paths) {
             let density = scene.camera.pixels_per_steradian(camera_ray.direction);
-            self.ratio = plan.per_sample as f32 * surface.point.distance_squared(camera_ray.origin) / density;
+            self.ratio = plan.per_sample as f32 / scene.camera_weight()
+                * surface.point.distance_squared(camera_ray.origin)
+                / density;
         }
+    }
+
+    /// Light paths don't find it.
+    #[inline]
+    pub(super) fn is_none(&self) -> bool {
+        self.ratio == 0.0
+    }
+
+    /// At a second surface, for a path that is weighed from there on for each that joined it there.
+    #[inline]
+    pub(super) fn begin_anew(&mut self, scene: &Prepared) {
+        self.ratio = if scene.light_paths.is_ok() { 1.0 } else { 0.0 };
     }
 
     /// As the path goes on to `wi`: the ratio, times the density of BSDF sampling to there.

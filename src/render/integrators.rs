@@ -7,10 +7,10 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::Prepared;
+use super::direct::{direct_light, transmittance};
 use super::from_light::FromLight;
-use super::path::{
-    PathSample, ReplayVertex, Strategies, Ways, direct_light, first_hit, next_surface, trace, transmittance,
-};
+use super::path::{PathSample, first_hit, next_surface, trace};
+use super::replay::ReplayVertex;
 use super::surface::Surface;
 use crate::accel::Ray;
 use crate::color::Rgb;
@@ -125,14 +125,13 @@ fn emitter_check(scene: &Prepared, sampler: &Sampler, surface: &Surface<'_>, ray
         LightPlace::Far { .. } => return Rgb::BLACK,
     };
     let cosines = shading.frame.local_from_world(sample.wi).z.abs() * cos_light;
-    let direct = direct_light(scene, surface, &shading, &sample, LIGHTS_ALONE, scene.camera_medium, rays);
+    let (way, medium) = (FromLight::CAMERA, scene.camera_medium);
+    let direct = direct_light(scene, surface, &shading, &sample, way, medium, rays);
+    let direct = direct.radiance / direct.pdf;
     // What arrives at grazing angles below the smallest float is nothing.
     if direct.is_black() { direct } else { direct / cosines }
 }
 
-/// Lights are found by sampling them.
-const LIGHTS_ALONE: Ways =
-    Ways { strategies: Strategies { nee: true, mis: false }, from_light: FromLight::CAMERA };
 /// A specular path goes on with this probability, after as many vertices as few are longer than.
 const SURVIVAL: f32 = 0.95;
 const ROULETTE_START: u32 = 4;
@@ -174,8 +173,9 @@ fn whitted(
         if !shading.bsdf.is_delta() {
             let u = sampler.set(vertex, Purpose::Light);
             if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
-                path.radiance += beta
-                    * direct_light(scene, &surface, &shading, &sample, LIGHTS_ALONE, medium, &mut path.rays);
+                let (way, rays) = (FromLight::CAMERA, &mut path.rays);
+                let direct = direct_light(scene, &surface, &shading, &sample, way, medium, rays);
+                path.radiance += beta * direct.radiance / direct.pdf;
             }
             break;
         }

@@ -12,10 +12,11 @@ use glam::{Vec2, Vec3};
 
 use super::Prepared;
 use super::camera::Sight;
+use super::direct::transmittance;
 use super::from_light::mirrors_back;
 use super::medium::{self, Medium};
 use super::offset::{offset, ray_to};
-use super::path::{next_surface, power_heuristic, transmittance};
+use super::path::{next_surface, power_heuristic};
 use super::surface::{Shading, Surface};
 use crate::accel::Ray;
 use crate::color::Rgb;
@@ -175,14 +176,9 @@ impl Turned {
     #[inline]
     fn new(scene: &Prepared, surface: &Surface<'_>, shading: &Shading<'_>, wo: Vec3) -> Option<Self> {
         let view = surface.shading_from(scene, shading, wo)?;
-        let wi = view.frame.local_from_world(surface.wo);
-        let goes_through = (wi.z < 0.0) != (view.wo.z < 0.0);
-        if surface.same_side(wo) == goes_through {
-            return None;
-        }
-        let (f, pdf) = view.bsdf.eval_with_pdf(view.wo, wi);
+        let (f, pdf) = surface.seen_from(wo).reflected(&view, surface.wo);
         let (c_camera, c_light) = (surface.geometric_cosine(wo), surface.geometric_cosine(surface.wo));
-        Some(Self { f: f * wi.z.abs(), pdf, cosines: c_camera / c_light })
+        Some(Self { f, pdf, cosines: c_camera / c_light })
     }
 }
 
@@ -203,10 +199,10 @@ impl Flight {
         let density =
             cosines * scene.camera.pixels_per_steradian(sight.direction) / (sight.distance * sight.distance);
         let per_sample = scene.light_paths.as_ref().ok()?.per_sample as f32;
-        let others = self.others_with(scene, surface, wo, pdf) * density / per_sample;
+        let others = self.others_with(scene, surface, wo, pdf) * density * scene.camera_weight() / per_sample;
         let radiance = self.beta * f * (density * power_heuristic(1.0, [others, 0.0]));
-        // Beyond all bounds times nothing is no number: such paths are left to the camera.
-        if radiance.is_black() || others.is_nan() {
+        // What the camera finds beyond all bounds more densely is left to it: its weight here is nothing, of what may be no number.
+        if radiance.is_black() || !others.is_finite() {
             return None;
         }
         *rays += 1;

@@ -3,6 +3,7 @@
 //! [`Geometry`] holds what the jobs of a sweep share; [`Prepared`] adds what a job's own materials, lights and camera need.
 
 mod camera;
+mod direct;
 mod film;
 mod filter;
 mod from_light;
@@ -19,6 +20,8 @@ mod pilot;
 mod prepare;
 mod probe;
 mod range;
+mod replay;
+mod reuse;
 mod sharing;
 mod skipped;
 mod surface;
@@ -32,8 +35,8 @@ pub use film::{Control, Rendered, render, render_together};
 pub use geometry::Geometry;
 pub use material::constant_bsdf;
 pub use offset::Departure;
-pub use path::{Replay, ReplayVertex, replay};
 pub use prepare::{Prepared, image_size};
+pub use replay::{Replay, ReplayVertex, replay};
 pub use techniques::Techniques;
 pub use variants::Variants;
 

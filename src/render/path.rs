@@ -5,14 +5,16 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 use super::Prepared;
-use super::from_light::{FromLight, with_light};
+use super::direct::direct_light;
+use super::from_light::FromLight;
 use super::medium::{self, Medium};
-use super::offset::offset;
+use super::replay::ReplayVertex;
+use super::reuse::{Direct, Later, Met, Onward, Trail};
 use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::disney::Lobe;
-use crate::light::{LightPlace, LightSample, Receiver};
+use crate::light::Receiver;
 use crate::math::sobol::{Purpose, Sampler};
 
 /// What one camera path found.
@@ -44,6 +46,8 @@ struct LastScatter {
 const ROULETTE_START: u32 = 4;
 /// And lets no more than this survive, so that a path through lossless surfaces ends.
 const MAX_SURVIVAL: f32 = 0.95;
+/// A path that others may have joined counts as one that carried at least this to there: they may carry more.
+const LEAST_BEFORE: f32 = 0.05;
 
 /// The power heuristic (Veach 1997) with exponent 2, safe from overflow: the weight of a sample by its density and those of the others.
 #[inline]
@@ -64,39 +68,29 @@ pub(super) struct Strategies {
 
 impl Strategies {
     #[inline]
-    fn of(scene: &Prepared) -> Self {
+    pub(super) fn of(scene: &Prepared) -> Self {
         Self { nee: scene.settings.nee, mis: scene.settings.mis }
     }
 
-    /// What a path counts that met a light which light paths find `from_light` times as densely. `pdfs`: the density of the BSDF sample that
-    /// led there, and that of sampling the light; none if it can't be sampled.
+    /// What a path counts that met a light: `others` is how many times as densely light sampling finds it, 0 if it can't, and light paths.
     #[inline]
-    fn w_bsdf(self, pdfs: Option<(f32, f32)>, from_light: f32) -> f32 {
-        let (pdf, pdf_light) = pdfs.unwrap_or((1.0, 0.0));
+    pub(super) fn w_bsdf(self, others: [f32; 2]) -> f32 {
         match self {
-            Self { nee: true, mis: true } => power_heuristic(1.0, [pdf_light / pdf, from_light]),
-            Self { nee: true, mis: false } if pdf_light > 0.0 => 0.0,
+            Self { nee: true, mis: true } => power_heuristic(1.0, others),
+            Self { nee: true, mis: false } if others[0] > 0.0 => 0.0,
             _ => 1.0,
         }
     }
 
-    /// What a light sample of density `pdf` counts that BSDF sampling finds with density `pdf_bsdf` and light paths with `pdf_path`.
+    /// What a light sample counts: `others` is how many times as densely BSDF sampling finds it, and light paths; none where nothing else does.
     #[inline]
-    fn w_light(self, pdf: f32, pdf_bsdf: f32, pdf_path: f32) -> f32 {
-        match self {
-            Self { nee: true, mis: true } => power_heuristic(pdf, [pdf_bsdf, pdf_path]),
-            Self { nee: true, mis: false } => 1.0,
-            Self { nee: false, .. } => 0.0,
+    pub(super) fn w_light(self, others: Option<[f32; 2]>) -> f32 {
+        match (self, others) {
+            (_, None) | (Self { nee: true, mis: false }, _) => 1.0,
+            (Self { nee: true, mis: true }, Some(others)) => power_heuristic(1.0, others),
+            (Self { nee: false, .. }, Some(_)) => 0.0,
         }
     }
-}
-
-/// How light is found besides sampling it here.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ways {
-    pub(super) strategies: Strategies,
-    /// What light paths know of the path so far.
-    pub(super) from_light: FromLight,
 }
 
 /// Traces one path. `inspect` is called at each vertex with the radiance gathered so far.
@@ -107,13 +101,18 @@ pub(super) fn trace(
     camera_ray: Ray,
     inspect: impl FnMut(ReplayVertex),
 ) -> PathSample {
-    Walk::new(scene, camera_ray).go_on(scene, sampler, None, |_| false, inspect).path()
+    let mut walk = Walk::new(scene, camera_ray);
+    walk.go_on(scene, sampler, None, |_| false, inspect);
+    walk.path()
 }
 
 /// A path under way, on the ray that its last surface sent out.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Walk {
     path: PathSample,
+    /// Where the path was divided, for others to join it there: what it had found and carried until then. Both count from there anew.
+    before: Option<Before>,
+    pub(super) trail: Trail,
     camera_ray: Ray,
     ray: Ray,
     /// The surfaces it met.
@@ -127,26 +126,19 @@ pub(super) struct Walk {
     from_light: FromLight,
 }
 
-/// How far a path went.
-pub(super) enum Walked {
-    /// To its end.
-    Over(PathSample),
-    /// To a surface where it was to stop, which has not scattered it yet.
-    Before(Walk, Hit),
-}
-
-impl Walked {
-    fn path(self) -> PathSample {
-        match self {
-            Self::Over(path) | Self::Before(Walk { path, .. }, _) => path,
-        }
-    }
+/// What a path found and carried before it was divided.
+#[derive(Clone, Copy)]
+struct Before {
+    radiance: Rgb,
+    beta: Rgb,
 }
 
 impl Walk {
     pub(super) fn new(scene: &Prepared, camera_ray: Ray) -> Self {
         Self {
             path: PathSample::default(),
+            before: None,
+            trail: Trail::unkept(),
             camera_ray,
             ray: camera_ray,
             vertices: 0,
@@ -159,17 +151,22 @@ impl Walk {
         }
     }
 
-    /// Goes on, from the surface `met` if it stopped there, until the path ends or meets one where it `stops`. `inspect` is called at each
-    /// surface with the radiance gathered so far.
+    /// A path that others of its block may use.
+    pub(super) fn shared(scene: &Prepared, camera_ray: Ray) -> Self {
+        Self { trail: Trail::kept(), ..Self::new(scene, camera_ray) }
+    }
+
+    /// Goes on, from the surface `met` if it stopped there, until the path ends or meets one where it `stops`, which has not scattered it yet:
+    /// the result. `inspect` is called at each surface with the radiance gathered so far.
     #[inline(always)]
     pub(super) fn go_on(
-        mut self,
+        &mut self,
         scene: &Prepared,
         sampler: &Sampler,
         mut met: Option<Hit>,
         stops: impl Fn(&Hit) -> bool,
         mut inspect: impl FnMut(ReplayVertex),
-    ) -> Walked {
+    ) -> Option<Hit> {
         loop {
             let hit = match met.take() {
                 Some(hit) => hit,
@@ -183,7 +180,7 @@ impl Walk {
                         break;
                     };
                     if stops(&hit) {
-                        return Walked::Before(self, hit);
+                        return Some(hit);
                     }
                     hit
                 }
@@ -192,28 +189,73 @@ impl Walk {
                 break;
             }
         }
-        Walked::Over(self.path)
+        None
     }
 
-    /// The number of rays so far.
-    pub(super) fn rays(&self) -> u64 {
-        self.path.rays
+    /// The same after it went on to its end from the surface `met` where it stopped, if it did.
+    pub(super) fn finished(&self, scene: &Prepared, sampler: &Sampler, met: Option<Hit>) -> Self {
+        let mut walk = self.clone();
+        if met.is_some() {
+            walk.go_on(scene, sampler, met, |_| false, |_| ());
+        }
+        walk
     }
 
-    /// Goes on to the end from a surface where it stopped.
-    pub(super) fn finish(self, scene: &Prepared, sampler: &Sampler, met: Hit) -> PathSample {
-        self.go_on(scene, sampler, Some(met), |_| false, |_| ()).path()
+    /// What it found; of a path that was divided, without what it found from there on.
+    pub(super) fn path(&self) -> PathSample {
+        PathSample { radiance: self.before.map_or(self.path.radiance, |before| before.radiance), ..self.path }
+    }
+
+    /// What a path that was divided found from there on, light paths' part in it aside.
+    pub(super) fn beyond(&self) -> Rgb {
+        if self.before.is_some() { self.path.radiance } else { Rgb::BLACK }
     }
 
     /// Meets nothing but the environment.
     #[inline(always)]
     fn leave_scene(&mut self, scene: &Prepared) {
         if let Some((radiance, pdf_light)) = scene.lights.environment(self.ray.direction) {
-            let emission = || scene.lights.pdf_emission_far(pdf_light);
-            let pdfs = self.last_scatter.map(|s| (s.pdf, pdf_light));
-            let w_bsdf = Strategies::of(scene).w_bsdf(pdfs, self.from_light.at_light(emission));
             let passing = medium::transmittance(self.medium, f32::INFINITY);
-            self.path.radiance += self.beta * radiance * w_bsdf * passing;
+            let emission = || scene.lights.pdf_emission_far(pdf_light);
+            self.add_met(scene, radiance * passing, |_| pdf_light, emission);
+        }
+    }
+
+    /// Adds the radiance of a light that the path met. `pdf_light` is the density of sampling it where the path last scattered, `emission`
+    /// that of its own paths' start.
+    #[inline(always)]
+    fn add_met(
+        &mut self,
+        scene: &Prepared,
+        radiance: Rgb,
+        pdf_light: impl FnOnce(&Receiver) -> f32,
+        emission: impl FnOnce() -> f32,
+    ) {
+        let radiance = self.beta * radiance;
+        let last = self.last_scatter.map(|last| (last.pdf, pdf_light(&last.receiver)));
+        if self.vertices == 3
+            && let Some(onward) = &mut self.trail.onward
+        {
+            (onward.met, onward.pdf_light) = (radiance, last.map_or(0.0, |(_, pdf_light)| pdf_light));
+            onward.emission = if scene.light_paths.is_ok() { emission() } else { 0.0 };
+            return;
+        }
+        let by_light = last.map_or(0.0, |(pdf, pdf_light)| pdf_light / pdf);
+        let from_light = self.from_light.at_light(emission);
+        self.add(radiance, 1.0, [by_light, from_light], |others| Strategies::of(scene).w_bsdf(others));
+    }
+
+    /// Adds radiance that was found with the density `pdf` and counts a `weight` against the `others`: if it depends on light paths and the
+    /// path was divided, each that joined it there has its own.
+    #[inline(always)]
+    fn add(&mut self, radiance: Rgb, pdf: f32, others: [f32; 2], weight: impl Fn([f32; 2]) -> f32) {
+        let [other, from_light] = others;
+        if from_light > 0.0 && self.before.is_some() {
+            let of_camera = weight([other, 0.0]);
+            let from_light = from_light * of_camera.sqrt();
+            self.trail.later.push(Later { radiance: radiance * (of_camera / pdf), from_light });
+        } else {
+            self.path.radiance += radiance * (weight(others) / pdf);
         }
     }
 
@@ -241,8 +283,8 @@ impl Walk {
         }
         inspect(ReplayVertex {
             point: (surface.point + scene.geometry.origin()).into(),
-            radiance: self.path.radiance,
-            beta: self.beta,
+            radiance: self.before.map_or(self.path.radiance, |b| b.radiance + b.beta * self.path.radiance),
+            beta: self.before.map_or(self.beta, |b| b.beta * self.beta),
         });
         let Some(shading) = shading else { return ControlFlow::Break(()) };
         if self.scatterings == scene.settings.max_depth {
@@ -255,19 +297,65 @@ impl Walk {
         }
 
         self.from_light.arrive(scene, &self.camera_ray, &surface);
+        if self.trail.is_kept && self.medium.is_none() && !shading.bsdf.is_delta() {
+            if self.vertices == 1 {
+                self.trail.first = Some(Met { ray: self.ray, hit: *hit });
+            } else if self.vertices == 2 && self.trail.leads_on() {
+                self.trail.second = Some(Met { ray: self.ray, hit: *hit });
+                return self.divide(scene, sampler, &surface, &shading);
+            }
+        }
         // Sample a light, unless no light could be reflected from it.
         let may_reflect = !(shading.bsdf.is_delta() && scene.techniques.useful_light);
         if may_reflect && !scene.lights.is_empty() {
             let u = sampler.set(self.vertices, Purpose::Light);
             if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
-                let ways = Ways { strategies: Strategies::of(scene), from_light: self.from_light };
-                let mut rays = 0;
-                let direct = direct_light(scene, &surface, &shading, &sample, ways, self.medium, &mut rays);
-                self.path.radiance += self.beta * direct;
-                self.path.rays += rays;
+                let (way, rays) = (self.from_light, &mut self.path.rays);
+                let direct = direct_light(scene, &surface, &shading, &sample, way, self.medium, rays);
+                let weight = |others| Strategies::of(scene).w_light(direct.others.map(|_| others));
+                let others = direct.others.unwrap_or_default();
+                self.add(self.beta * direct.radiance, direct.pdf, others, weight);
             }
         }
-        self.send_on(scene, &surface, &shading, sampler.set(self.vertices, Purpose::Bsdf))
+        let flow = self.send_on(scene, &surface, &shading, sampler.set(self.vertices, Purpose::Bsdf));
+        if self.vertices == 1
+            && self.trail.is_kept
+            && let Some(last) = self.last_scatter
+            && surface.same_side(self.ray.direction)
+        {
+            (self.trail.weight, self.trail.pdf) = (self.beta, last.pdf);
+        }
+        flow
+    }
+
+    /// Scatters the path where others may join it: what it finds from here on is kept for all of them.
+    #[inline(always)]
+    fn divide(
+        &mut self,
+        scene: &Prepared,
+        sampler: &Sampler,
+        surface: &Surface<'_>,
+        shading: &Shading<'_>,
+    ) -> ControlFlow<()> {
+        if !scene.lights.is_empty() {
+            let u = sampler.set(self.vertices, Purpose::Light);
+            let sample = scene.lights.sample(&surface.receiver(), u);
+            self.trail.direct =
+                sample.and_then(|s| Direct::new(scene, surface, shading, &s, &mut self.path.rays));
+        }
+        let beta = std::mem::replace(&mut self.beta, Rgb::WHITE);
+        let flow = self.send_on(scene, surface, shading, sampler.set(self.vertices, Purpose::Bsdf));
+        let weight = self.beta;
+        self.beta = beta * weight;
+        if flow.is_continue()
+            && let Some(LastScatter { pdf, .. }) = self.last_scatter
+        {
+            self.trail.onward = Some(Onward::new(self.ray.direction, weight, pdf));
+            self.before = Some(Before { radiance: self.path.radiance, beta: self.beta });
+            (self.path.radiance, self.beta) = (Rgb::BLACK, Rgb::WHITE);
+            self.from_light.begin_anew(scene);
+        }
+        flow
     }
 
     /// Adds what a surface sends out by itself.
@@ -275,14 +363,11 @@ impl Walk {
     fn add_emitted(&mut self, scene: &Prepared, surface: &Surface<'_>) {
         let emitted = surface.emitted(scene);
         if !emitted.is_black() {
-            let pdfs = self.last_scatter.map(|s| {
-                let distance = (surface.point - s.receiver.point).length();
-                let (triangle, wi) = (surface.triangle, self.ray.direction);
-                (s.pdf, scene.lights.pdf_triangle(&s.receiver, triangle, wi, distance))
-            });
-            let emission = || scene.lights.pdf_emission(surface.triangle);
-            let w_bsdf = Strategies::of(scene).w_bsdf(pdfs, self.from_light.at_light(emission));
-            self.path.radiance += self.beta * emitted * w_bsdf;
+            let (triangle, wi) = (surface.triangle, self.ray.direction);
+            let pdf_light = |from: &Receiver| {
+                scene.lights.pdf_triangle(from, triangle, wi, (surface.point - from.point).length())
+            };
+            self.add_met(scene, emitted, pdf_light, || scene.lights.pdf_emission(triangle));
         }
         if self.last_scatter.is_none() {
             self.path.radiance += self.beta * surface.unlit(scene);
@@ -331,7 +416,8 @@ impl Walk {
 
         // End paths that carry little, and let survivors stand for them.
         if self.scatterings > ROULETTE_START && scene.techniques.roulette {
-            let survival = (self.beta.max_channel() * self.eta_scale).min(MAX_SURVIVAL);
+            let before = self.before.map_or(1.0, |before| before.beta.max_channel().max(LEAST_BEFORE));
+            let survival = (self.beta.max_channel() * before * self.eta_scale).min(MAX_SURVIVAL);
             if u_roulette >= survival {
                 return ControlFlow::Break(());
             }
@@ -362,98 +448,6 @@ pub(super) fn next_surface(
     })
 }
 
-/// What arrives from a light sample and is reflected to the viewer, weighed against BSDF sampling.
-#[inline]
-pub(super) fn direct_light(
-    scene: &Prepared,
-    surface: &Surface<'_>,
-    shading: &Shading<'_>,
-    sample: &LightSample,
-    Ways { strategies, from_light }: Ways,
-    arrived: Medium,
-    rays: &mut u64,
-) -> Rgb {
-    let wi = shading.frame.local_from_world(sample.wi);
-    let goes_through = (wi.z < 0.0) != (shading.wo.z < 0.0);
-    if surface.same_side(sample.wi) == goes_through {
-        return Rgb::BLACK;
-    }
-    let (f, pdf_bsdf) = shading.bsdf.eval_with_pdf(shading.wo, wi);
-    let is_left_out = |is_dark: bool| is_dark && scene.techniques.useful_light;
-    if is_left_out(f.is_black()) {
-        return Rgb::BLACK;
-    }
-    let (arriving, w_light, shadow) = match sample.place {
-        LightPlace::Surface { triangle, barycentric } => {
-            let light = scene.geometry.point_on(triangle, barycentric);
-            let normal = light.geometric_normal().unwrap_or(-sample.wi);
-            let material = scene.material_of(triangle);
-            let coverage = material.alpha(&scene.scene, &light, sample.wi);
-            let radiance = material.emitted(&scene.scene, &light, normal.dot(sample.wi) < 0.0) * coverage;
-            let (point, error) = light.position();
-            let target = offset(point, error, normal, -sample.wi);
-            let towards = from_light.towards(scene, surface, shading, sample.wi);
-            let pdf_path = with_light(towards, || scene.lights.pdf_emission(triangle));
-            (radiance, strategies.w_light(sample.pdf, pdf_bsdf, pdf_path), surface.reach(sample.wi, target))
-        }
-        LightPlace::Point { position, radiance } => (radiance, 1.0, surface.reach(sample.wi, position)),
-        LightPlace::Far { radiance, is_delta } => {
-            let pdf_path = || {
-                let towards = from_light.towards(scene, surface, shading, sample.wi);
-                with_light(towards, || scene.lights.pdf_emission_far(sample.pdf))
-            };
-            let w_light = if is_delta { 1.0 } else { strategies.w_light(sample.pdf, pdf_bsdf, pdf_path()) };
-            (radiance, w_light, surface.leave(sample.wi))
-        }
-    };
-    if is_left_out(arriving.is_black() || w_light == 0.0) {
-        return Rgb::BLACK;
-    }
-    *rays += 1;
-    let mut passing = transmittance(scene, &shadow);
-    let medium = surface.medium_towards(sample.wi, arrived);
-    if medium.is_some() {
-        let is_far = matches!(sample.place, LightPlace::Far { .. });
-        let distance = if is_far { f32::INFINITY } else { shadow.direction.length() };
-        passing *= medium::transmittance(medium, distance);
-    }
-    f * arriving * passing * (wi.z.abs() * w_light / sample.pdf)
-}
-
-/// The fraction of light that passes a segment: the product of what each surface on it lets through.
-#[inline]
-pub(super) fn transmittance(scene: &Prepared, shadow: &Ray) -> Rgb {
-    if scene.all_opaque {
-        return if scene.geometry.bvh.occluded(shadow) { Rgb::BLACK } else { Rgb::WHITE };
-    }
-    let mut passing = Rgb::WHITE;
-    let ray = Ray { direction: shadow.direction.normalize(), ..*shadow };
-    let blocked = scene.geometry.bvh.visit(shadow, |hit| {
-        passing *= passing_surface(scene, &ray, &hit);
-        if passing.is_black() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
-    if blocked { Rgb::BLACK } else { passing }
-}
-
-/// What a surface lets pass of light that goes straight through it along `ray`: where it isn't there, all, and a clear sheet its part.
-#[inline]
-fn passing_surface(scene: &Prepared, ray: &Ray, hit: &Hit) -> Rgb {
-    let material = scene.material_of(hit.triangle);
-    if material.blocks_shadow_rays() {
-        return Rgb::BLACK;
-    }
-    let alpha = material.alpha(&scene.scene, &scene.geometry.at(hit), ray.direction);
-    let absent = Rgb::grey(1.0 - alpha);
-    if alpha == 0.0 || !material.lets_shadow_rays_pass {
-        return absent;
-    }
-    let mut varying = None;
-    let sheet = Surface::new(scene, ray, hit)
-        .shading(scene, &mut varying)
-        .and_then(|shading| shading.bsdf.straight_transmittance(shading.wo));
-    sheet.map_or(absent, |passing| absent + passing * alpha)
-}
-
 pub(super) fn first_hit(
     scene: &Prepared,
     ray: &Ray,
@@ -465,33 +459,6 @@ pub(super) fn first_hit(
         normal: shading.map_or(Vec3::ZERO, |s| if s.wo.z < 0.0 { -s.frame.normal } else { s.frame.normal }),
         depth: (surface.point - ray.origin).dot(scene.camera.axis),
     }
-}
-
-/// One vertex of a replayed path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReplayVertex {
-    /// World position.
-    pub point: [f32; 3],
-    /// The radiance gathered up to here, this surface's emission included.
-    pub radiance: Rgb,
-    /// The throughput with which the path arrived.
-    pub beta: Rgb,
-}
-
-/// A path told vertex by vertex.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Replay {
-    /// The sample's radiance, as it is: not finite if the sample is bad.
-    pub radiance: Rgb,
-    /// Where the path went.
-    pub vertices: Vec<ReplayVertex>,
-}
-
-/// Traces sample `sample` of pixel (x, y) again and tells where it went.
-pub fn replay(scene: &Prepared, x: u32, y: u32, sample: u32) -> Replay {
-    let mut vertices = Vec::new();
-    let path = super::film::sample_pixel(scene, x, y, sample, |v| vertices.push(v));
-    Replay { radiance: path.radiance, vertices }
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use super::material::PreparedMaterial;
 use super::medium::Medium;
 use super::pilot;
 use super::range;
+use super::reuse;
 use super::techniques::Techniques;
 use crate::accel::Ray;
 use crate::light::{EmissiveTriangle, EnvironmentLight, EnvironmentTables, Lights, Partner};
@@ -54,6 +55,8 @@ pub struct Prepared {
     /// No surface lets shadow rays pass, so that they need none either.
     pub(super) all_opaque: bool,
     pub(super) techniques: Techniques,
+    /// Neighbouring pixels use each other's paths, or why not.
+    pub(super) path_reuse: Result<(), String>,
 }
 
 impl Prepared {
@@ -113,16 +116,15 @@ impl Prepared {
             all_covered,
             all_opaque,
             techniques: Techniques::default(),
+            path_reuse: Err(String::new()),
             scene,
             geometry,
         };
         prepared.camera_medium = prepared.medium_around(&prepared.camera.axis_ray());
-        if let (Use::Auto, Ok(plan)) = (settings.light_paths, &prepared.light_paths) {
-            let worth = pilot::light_paths(&prepared, plan);
-            if !worth.pays() {
-                prepared.light_paths = Err(format!("they would leave {worth}"));
-            }
-        }
+        let path_reuse = path_reuse(settings, all_opaque);
+        let choice = pilot::choose(&prepared, path_reuse.is_ok());
+        prepared.light_paths = prepared.light_paths.and_then(|plan| choice.light_paths.map(|()| plan));
+        prepared.path_reuse = path_reuse.and(choice.path_reuse);
         Ok(prepared)
     }
 
@@ -139,6 +141,9 @@ impl Prepared {
         if !techniques.light_paths {
             self.light_paths = Err("left out".to_owned());
         }
+        if !techniques.path_reuse {
+            self.path_reuse = Err("left out".to_owned());
+        }
         self.all_covered &= techniques.coverage;
         self.all_opaque &= techniques.coverage;
         self.techniques = techniques;
@@ -148,6 +153,17 @@ impl Prepared {
     /// Paths start from lights too: those of the camera are but a part of the picture.
     pub fn has_light_paths(&self) -> bool {
         self.light_paths.is_ok()
+    }
+
+    /// Neighbouring pixels use each other's paths.
+    pub fn has_path_reuse(&self) -> bool {
+        self.path_reuse.is_ok()
+    }
+
+    /// How many times as good camera paths are as light paths take them to be: each is used by all pixels of its block.
+    #[inline]
+    pub(super) fn camera_weight(&self) -> f32 {
+        if self.path_reuse.is_ok() { reuse::BLOCK as f32 } else { 1.0 }
     }
 
     /// Columns and rows of the image.
@@ -299,6 +315,20 @@ fn light_paths(
     match needed.into_iter().find(|(is_given, _)| !is_given) {
         Some((_, why)) => Err(why.to_owned()),
         None => Ok(LightPaths { per_sample: pixels.div_ceil(PIXELS_PER_PATH) }),
+    }
+}
+
+/// That neighbouring pixels may use each other's paths, or why not.
+fn path_reuse(settings: &RenderSettings, all_opaque: bool) -> Result<(), String> {
+    let needed = [
+        (settings.path_reuse != Use::Never, "the settings ask for none"),
+        (light_partner(settings) == Partner::Bsdf, "both ways to find light are needed to weigh it"),
+        (settings.max_depth > 1, "no light is scattered twice"),
+        (all_opaque, "some surface lets light go straight through"),
+    ];
+    match needed.into_iter().find(|(is_given, _)| !is_given) {
+        Some((_, why)) => Err(why.to_owned()),
+        None => Ok(()),
     }
 }
 

@@ -36,6 +36,9 @@ impl Prepared {
         if let Err(why) = &self.light_paths {
             skipped.push(format!("light paths: {why}"));
         }
+        if let Err(why) = &self.path_reuse {
+            skipped.push(format!("reuse of paths by neighbouring pixels: {why}"));
+        }
         skipped.extend(self.absent_lights());
         skipped
     }

@@ -179,6 +179,19 @@ impl<'a> Surface<'a> {
         (wi.dot(self.normal) > 0.0) == self.is_front
     }
 
+    /// The BSDF times |cos θi| for light from the unit direction `wi`, and the density of sampling it: both 0 where the shading normal has it on
+    /// another side than the geometric one. `shading` is that of this viewer.
+    #[inline]
+    pub(super) fn reflected(&self, shading: &Shading<'_>, wi: Vec3) -> (Rgb, f32) {
+        let local = shading.frame.local_from_world(wi);
+        let goes_through = (local.z < 0.0) != (shading.wo.z < 0.0);
+        if self.same_side(wi) == goes_through {
+            return (Rgb::BLACK, 0.0);
+        }
+        let (f, pdf) = shading.bsdf.eval_with_pdf(shading.wo, local);
+        (f * local.z.abs(), pdf)
+    }
+
     /// The medium that `wi` leaves into, for a path that came through `arrived`: interfaces have one behind them and clear space in front.
     #[inline]
     pub(super) fn medium_towards(&self, wi: Vec3, arrived: Medium) -> Medium {

@@ -12,6 +12,8 @@ pub struct Techniques {
     pub roulette: bool,
     /// Paths start from lights too; without it from the camera alone.
     pub light_paths: bool,
+    /// Neighbouring pixels use each other's paths; without it each has its own.
+    pub path_reuse: bool,
     /// Saves work: what is the same all over a material is worked out once; without it at each point.
     pub constants: bool,
     /// Saves work: where all surfaces are opaque, rays ask no material whether it is there.
@@ -27,6 +29,7 @@ impl Default for Techniques {
             lobes_by_albedo: true,
             roulette: true,
             light_paths: true,
+            path_reuse: true,
             constants: true,
             coverage: true,
             useful_light: true,

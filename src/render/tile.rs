@@ -1,10 +1,12 @@
 //! The tiles that threads work on: what their pixels' samples add up to, and whether that is enough.
 
 use glam::{DVec3, Vec3};
+use smallvec::SmallVec;
 
 use super::Prepared;
 use super::light_image::LightImage;
 use super::path::PathSample;
+use super::reuse;
 use crate::color::Rgb;
 use crate::math::stats::relative_square;
 use crate::record::BadSample;
@@ -17,6 +19,9 @@ const SIDE: u32 = 16;
 pub(super) const NAMED_BAD_SAMPLES: usize = 16;
 /// The fewest samples a pixel by which an error is judged.
 const FEWEST_JUDGED: u32 = 16;
+
+/// The places of pixels that are sampled together.
+pub(super) type Block = SmallVec<[(u32, u32); reuse::BLOCK]>;
 
 /// One pixel's result: means over all its samples, where a sample that hits nothing has albedo and normal 0; the depth is the mean
 /// over those that hit something.
@@ -107,6 +112,13 @@ impl Tile {
         u64::from(self.width) * u64::from(self.height)
     }
 
+    /// Its pixels in blocks of so many columns and rows.
+    pub(super) fn blocks(&self, sides: (u32, u32)) -> impl Iterator<Item = Block> {
+        let end = (self.x0 + self.width, self.y0 + self.height);
+        let corners = self.places().filter(move |(x, y)| x % sides.0 == 0 && y % sides.1 == 0);
+        corners.map(move |corner| reuse::block_around(corner, sides, end).collect())
+    }
+
     /// Makes ready for as many as `samples` of each pixel.
     pub(super) fn begin(&mut self, settings: &RenderSettings, samples: u32) {
         let area = self.area() as usize;
@@ -115,9 +127,10 @@ impl Tile {
         self.second_half = settings.is_halved().then(|| second_half(samples));
     }
 
-    /// Adds sample `sample` of a pixel.
+    /// Adds sample `sample` of the pixel (x, y).
     #[inline]
-    pub(super) fn add(&mut self, pixel: usize, sample: u32, path: &PathSample) {
+    pub(super) fn add(&mut self, (x, y): (u32, u32), sample: u32, path: &PathSample) {
+        let pixel = ((y - self.y0) * self.width + x - self.x0) as usize;
         let count = self.parts.len() / self.sums.len();
         let parts = &mut self.parts[pixel * count..][..count];
         if self.second_half == Some(sample) {
@@ -130,7 +143,6 @@ impl Tile {
         if !r.is_finite() || r.r < 0.0 || r.g < 0.0 || r.b < 0.0 {
             self.bad_count += 1;
             if self.bad.len() < NAMED_BAD_SAMPLES {
-                let (x, y) = self.place(pixel);
                 self.bad.push(BadSample { x, y, sample });
             }
             return;

@@ -6,11 +6,16 @@
 
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
 use super::Prepared;
 use super::film::{camera_sample, sample_pixel};
 use super::light_image;
-use super::path::{PathSample, Walk, Walked};
+use super::path::{PathSample, Walk};
+use super::reuse::{self, gather};
 use super::tile;
+use crate::accel::Hit;
+use crate::math::sobol::Sampler;
 use crate::settings::Integrator;
 
 /// Most variants at once: of what the first of them share, little is left to save.
@@ -86,10 +91,33 @@ impl<'a> Variants<'a> {
         usize::try_from(MOST_MEMORY / bytes.max(1)).unwrap_or(MOST).clamp(1, MOST)
     }
 
-    /// Takes a sample of a pixel of the variants that are `going` on, at least one, and gives each one's to `found`, with the number of
-    /// rays that others share.
+    /// The columns and rows of the blocks whose pixels are sampled together.
+    pub(super) fn block_sides(&self) -> (u32, u32) {
+        if self.scenes[0].path_reuse.is_ok() { reuse::SIDES } else { (1, 1) }
+    }
+
+    /// Takes a sample of each pixel of a block of the variants that are `going` on, at least one, and gives each one's to `found`, with the
+    /// pixel's place in the block and the number of rays that others share.
     #[inline]
     pub(super) fn sample(
+        &self,
+        going: &[usize],
+        block: &[(u32, u32)],
+        sample: u32,
+        mut found: impl FnMut(usize, usize, &PathSample, u64),
+    ) {
+        if self.scenes[going[0]].path_reuse.is_ok() {
+            return self.sample_block(going, block, sample, found);
+        }
+        for (pixel, &place) in block.iter().enumerate() {
+            self.sample_pixel(going, place, sample, |variant, path, shared| {
+                found(variant, pixel, path, shared)
+            });
+        }
+    }
+
+    #[inline]
+    fn sample_pixel(
         &self,
         going: &[usize],
         (x, y): (u32, u32),
@@ -101,15 +129,62 @@ impl<'a> Variants<'a> {
             return found(going[0], &sample_pixel(first, x, y, sample, |_| ()), 0);
         }
         let (sampler, ray) = camera_sample(first, x, y, sample);
-        let differs = |triangle| self.differing[first.material_index(triangle)];
-        match Walk::new(first, ray).go_on(first, &sampler, None, |hit| differs(hit.triangle), |_| ()) {
-            Walked::Over(path) => going.iter().for_each(|&variant| found(variant, &path, path.rays)),
-            Walked::Before(walk, hit) => {
-                for &variant in going {
-                    found(variant, &walk.finish(self.scenes[variant], &sampler, hit), walk.rays());
+        let mut walk = Walk::new(first, ray);
+        let Some(met) = walk.go_on(first, &sampler, None, |hit| self.differs(hit), |_| ()) else {
+            let path = walk.path();
+            return going.iter().for_each(|&variant| found(variant, &path, path.rays));
+        };
+        for &variant in going {
+            let path = walk.finished(self.scenes[variant], &sampler, Some(met)).path();
+            found(variant, &path, walk.path().rays);
+        }
+    }
+
+    /// The pixels join each other's paths ([`super::reuse`]).
+    fn sample_block(
+        &self,
+        going: &[usize],
+        block: &[(u32, u32)],
+        sample: u32,
+        mut found: impl FnMut(usize, usize, &PathSample, u64),
+    ) {
+        let first = self.scenes[going[0]];
+        let are_several = going.len() > 1;
+        let mut walks = SmallVec::<[Walk; reuse::BLOCK]>::new();
+        let mut stops = SmallVec::<[(Sampler, Option<Hit>); reuse::BLOCK]>::new();
+        for &(x, y) in block {
+            let (sampler, ray) = camera_sample(first, x, y, sample);
+            walks.push(Walk::shared(first, ray));
+            let last = walks.len() - 1;
+            let stopped = |hit: &Hit| are_several && self.differs(hit);
+            let met = walks[last].go_on(first, &sampler, None, stopped, |_| ());
+            stops.push((sampler, met));
+        }
+        if stops.iter().all(|(_, met)| met.is_none()) {
+            let samples = gather(first, &walks);
+            for &variant in going {
+                for (pixel, path) in samples.iter().enumerate().take(block.len()) {
+                    found(variant, pixel, path, if are_several { path.rays } else { 0 });
                 }
             }
+            return;
         }
+        for &variant in going {
+            let scene = self.scenes[variant];
+            let finished: SmallVec<[Walk; reuse::BLOCK]> = walks
+                .iter()
+                .zip(&stops)
+                .map(|(walk, (sampler, met))| walk.finished(scene, sampler, *met))
+                .collect();
+            let samples = gather(scene, &finished);
+            for (pixel, (path, walk)) in samples.iter().zip(&walks).enumerate() {
+                found(variant, pixel, path, walk.path().rays);
+            }
+        }
+    }
+
+    fn differs(&self, hit: &Hit) -> bool {
+        self.differing[self.scenes[0].material_index(hit.triangle)]
     }
 }
 
@@ -124,6 +199,7 @@ fn differ_in_materials_alone(a: &Prepared, b: &Prepared) -> bool {
         && a.settings.integrator == Integrator::Path
         && a.techniques == b.techniques
         && a.light_paths.is_ok() == b.light_paths.is_ok()
+        && a.path_reuse.is_ok() == b.path_reuse.is_ok()
         && a.camera_medium == b.camera_medium
         && from.materials.len() == to.materials.len()
         && from.instances == to.instances

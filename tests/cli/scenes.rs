@@ -42,7 +42,8 @@ fn the_cornell_box_as_obj_and_as_aris_scene_is_the_same_picture() {
     let desk = Desk::with_three_jobs("");
     let obj = repository("scenes/cornell.obj");
     let aris = repository("scenes/aris/config/scene/cbox_diffuse.yaml");
-    let size = ["--width", "48", "--height", "36", "--spp", "16"];
+    // With each pixel's own paths.
+    let size = ["--width", "48", "--height", "36", "--spp", "16", "--set", "render.path_reuse=never"];
     let camera = [
         "--set",
         "camera.c2w=[[-1.0, 0.0, 0.0, 0.0], [0.0, 0.9996573249755573, 0.02617694830787315, 0.92], \

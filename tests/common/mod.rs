@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "every test binary uses its own part")]
 
 pub(crate) mod closed;
+pub(crate) mod lit;
 
 use std::sync::Arc;
 

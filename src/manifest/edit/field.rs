@@ -151,6 +151,7 @@ fields! {
         Nee "nee": "true or false",
         Mis "mis": "true or false",
         LightPaths "light_paths": "one of \"auto\", \"always\", \"never\"",
+        PathReuse "path_reuse": "one of \"auto\", \"always\", \"never\"",
     }
 }
 

@@ -69,6 +69,7 @@ pub(in crate::manifest) const HOMES: &[(&str, &[&str])] = &[
             "nee",
             "mis",
             "light_paths",
+            "path_reuse",
         ],
     ),
     ("[sheet]", &["columns", "rows", "cell_width"]),

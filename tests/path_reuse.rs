@@ -1,0 +1,154 @@
+//! Neighbouring pixels use each other's paths: with that pictures have the same mean as without, and less noise where it pays.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::lit::{
+    assert_same_means, bottled, camera, clear, covered, lamp, leaning, rendered, shiny, sunny, walls,
+};
+use common::{lambert, scene, small, sphere};
+use glam::Vec3;
+use pipeline::render::{Geometry, Prepared, replay};
+use pipeline::scene::Scene;
+use pipeline::settings::{Filter, RenderSettings, Use};
+
+/// Without either technique.
+fn plain(spp: u32) -> RenderSettings {
+    RenderSettings { light_paths: Use::Never, path_reuse: Use::Never, ..small(32, 24, spp, 5) }
+}
+
+/// Walls and a dull ball.
+fn dull() -> Scene {
+    let mut parts = walls();
+    parts.push((sphere(0.5, Vec3::new(-0.5, 0.6, 0.0), 12), lambert(0.4)));
+    parts.push(lamp());
+    scene(parts, camera())
+}
+
+#[test]
+fn with_and_without_path_reuse_every_part_of_a_picture_has_the_same_mean() {
+    for (what, world, filter) in [
+        ("dull", dull(), Filter::Box),
+        ("shiny", shiny(), Filter::Tent),
+        ("bottled", bottled(), Filter::Box),
+        ("covered", covered(), Filter::BlackmanHarris),
+        ("sunny", sunny(), Filter::Box),
+        ("leaning", leaning(), Filter::Box),
+    ] {
+        let world = Arc::new(world);
+        for light_paths in [Use::Never, Use::Always] {
+            // Camera paths alone find the sun's reflection too rarely to tell a mean.
+            if what == "sunny" && light_paths == Use::Never {
+                continue;
+            }
+            let without = RenderSettings { filter, light_paths, ..plain(256) };
+            let with = RenderSettings { path_reuse: Use::Always, spp: 96, ..without.clone() };
+            assert_same_means(&format!("{what}, light paths {light_paths:?}"), &world, &with, &without);
+        }
+    }
+}
+
+/// Blocks at the edges are smaller.
+#[test]
+fn path_reuse_has_the_same_bits_on_any_number_of_threads() {
+    let world = Arc::new(shiny());
+    for (light_paths, error) in [(Use::Never, None), (Use::Always, None), (Use::Always, Some(0.02))] {
+        let settings = RenderSettings { light_paths, path_reuse: Use::Always, error, ..small(41, 31, 33, 6) };
+        let with_threads = |n| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
+            pool.install(|| rendered(&world, &settings))
+        };
+        let one = with_threads(1);
+        for n in [2, 5] {
+            let many = with_threads(n);
+            assert_eq!(one.raster, many.raster);
+            assert_eq!(one.counts, many.counts);
+        }
+    }
+}
+
+fn prepared(world: &Scene, settings: &RenderSettings) -> Prepared {
+    let world = Arc::new(world.clone());
+    let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
+    Prepared::new(world, geometry, settings).expect("prepared")
+}
+
+/// What a replay tells of a pixel's samples is what the picture has there, also in a block that the edge cuts off.
+#[test]
+fn replayed_samples_have_the_mean_that_the_picture_has() {
+    let settings =
+        RenderSettings { path_reuse: Use::Always, ..RenderSettings { width: Some(33), ..plain(16) } };
+    let world = shiny();
+    let beauty = rendered(&Arc::new(world.clone()), &settings)
+        .raster
+        .picture()
+        .rgb()
+        .expect("colour")
+        .map(<[f32]>::to_vec);
+    let scene = prepared(&world, &settings);
+    for (x, y) in [(5, 7), (16, 12), (17, 13), (32, 10), (20, 20)] {
+        let samples = (0..16).map(|sample| replay(&scene, x, y, sample).radiance);
+        let mean = samples.fold(0.0, |sum, radiance| sum + f64::from(radiance.g)) / 16.0;
+        let pixel = f64::from(beauty[1][(y * 33 + x) as usize]);
+        assert!((mean - pixel).abs() < 1e-6 * (1.0 + pixel), "{x}, {y}: {mean} {pixel}");
+    }
+}
+
+fn error(world: &Arc<Scene>, settings: &RenderSettings, reference: &[Vec<f32>; 3]) -> f64 {
+    let seeds = 0..4;
+    let picture = |seed| {
+        let rendered = rendered(world, &RenderSettings { seed, ..settings.clone() });
+        rendered.raster.picture().rgb().expect("colour").map(<[f32]>::to_vec)
+    };
+    let squares = |picture: [Vec<f32>; 3]| -> f64 {
+        let values = picture.iter().flatten().zip(reference.iter().flatten());
+        values.map(|(x, r)| f64::from((x - r) * (x - r)) / f64::from(r * r + 0.01)).sum()
+    };
+    seeds.map(|seed| squares(picture(seed))).sum()
+}
+
+#[test]
+fn indirect_light_has_less_than_half_the_error() {
+    let world = Arc::new(dull());
+    let without = plain(16);
+    let with = RenderSettings { path_reuse: Use::Always, ..without.clone() };
+    let long = RenderSettings { seed: 99, ..plain(2048) };
+    let reference = rendered(&world, &long).raster.picture().rgb().expect("colour").map(<[f32]>::to_vec);
+    let (with, without) = (error(&world, &with, &reference), error(&world, &without, &reference));
+    assert!(with < 0.6 * without && with > 0.1 * without, "{with} {without}");
+}
+
+fn why_not(world: &Scene, settings: &RenderSettings) -> Option<String> {
+    let skipped = prepared(world, settings).skipped();
+    skipped.into_iter().find(|line| line.starts_with("reuse of paths"))
+}
+
+/// Whatever the seed, and whatever the number of samples.
+#[test]
+fn paths_are_reused_where_it_pays() {
+    // Nothing but direct light.
+    let open = scene(vec![(common::square(2.0, 0.0), lambert(0.3)), lamp()], camera());
+    for seed in 0..8 {
+        let settings = RenderSettings { seed, ..small(80, 60, 1 << (seed % 4), 6) };
+        assert_eq!(why_not(&dull(), &settings), None);
+        let why = why_not(&open, &settings).expect("nothing is lit indirectly");
+        assert!(why.contains("it would leave"), "{why}");
+    }
+}
+
+#[test]
+fn what_keeps_paths_from_being_reused_is_told() {
+    let usual = RenderSettings { path_reuse: Use::Always, ..plain(1) };
+    let cases = [
+        (dull(), RenderSettings { path_reuse: Use::Never, ..usual.clone() }, "the settings ask for none"),
+        (dull(), RenderSettings { nee: false, ..usual.clone() }, "both ways to find light"),
+        (dull(), RenderSettings { max_depth: 1, ..usual.clone() }, "no light is scattered twice"),
+        (clear(), usual.clone(), "some surface lets light go straight through"),
+    ];
+    for (world, settings, expected) in cases {
+        let why = why_not(&world, &settings).expect("a reason");
+        assert!(why.contains(expected), "{why}: {expected}");
+    }
+    assert_eq!(why_not(&dull(), &usual), None);
+}
