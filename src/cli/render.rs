@@ -4,7 +4,6 @@ mod config_root;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use self::config_root::{Outputs, Shown};
@@ -244,11 +243,12 @@ fn render_with_progress(
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
     let (width, height) = prepared.size();
+    let pixels = u64::from(width) * u64::from(height);
     let counts = &rendered.counts;
     talk.say(&format!(
         "{width} × {height}, {} samples a pixel{}, {} triangles, {seconds:.1} s, {:.2} M rays/s",
-        counts.paths / (u64::from(width) * u64::from(height)),
-        if counts.paths == control.total_paths.load(Ordering::Relaxed) { "" } else { " on average" },
+        counts.paths / pixels,
+        if counts.paths == pixels * u64::from(planned.settings.spp) { "" } else { " on average" },
         counts.triangles,
         counts.rays as f64 * 1e-6 / seconds.max(1e-9),
     ));
@@ -326,8 +326,9 @@ fn tell_path(prepared: &Prepared, planned: &PlannedJob, x: u32, y: u32, sample: 
         text +=
             &format!("{:>3}  at ({px}, {py}, {pz})  beta {beta:?}  radiance so far {radiance:?}\n", i + 1);
     }
-    let part = if prepared.has_light_paths() { ", without what light paths bring" } else { "" };
-    print(&format!("{text}radiance {:?}{part}\n", path.radiance.to_array()))?;
+    let joined = if prepared.has_path_reuse() { ", with what neighbours' paths bring" } else { "" };
+    let lit = if prepared.has_light_paths() { ", without what light paths bring" } else { "" };
+    print(&format!("{text}radiance {:?}{joined}{lit}\n", path.radiance.to_array()))?;
     Ok(WELL)
 }
 

@@ -68,6 +68,11 @@ impl Variant {
                 Change::Without(|techniques| techniques.light_paths = false),
             ),
             Self::new(
+                "no path reuse",
+                "neighbouring pixels don't use each other's paths",
+                Change::Without(|techniques| techniques.path_reuse = false),
+            ),
+            Self::new(
                 "no roulette",
                 "paths go on to the greatest depth",
                 Change::Without(|techniques| techniques.roulette = false),
