@@ -234,13 +234,15 @@ fn join(
     let second = Surface::new(scene, &met.ray, &met.hit);
     let mut varying = None;
     let Some(shading) = second.shading(scene, &mut varying) else { return };
-    let views: [Option<View<'_>>; BLOCK] = std::array::from_fn(|pixel| {
-        let viewer = viewers[pixel].as_ref()?;
-        if pixel == own {
-            viewer.own_view(scene, pixel, trail, &second, shading)
-        } else {
-            viewer.view(scene, pixel, &second, &shading, &mut samples[pixel].rays)
-        }
+    let Some(viewer) = &viewers[own] else { return };
+    let own_view = viewer.own_view(scene, own, trail, &second, shading);
+    let is_alone = !is_usual(own_view.density);
+    let own_view = if is_alone { View { f: trail.weight, density: 1.0, ..own_view } } else { own_view };
+    let mut own_view = Some(own_view);
+    let views: [Option<View<'_>>; BLOCK] = std::array::from_fn(|pixel| match &viewers[pixel] {
+        _ if pixel == own => own_view.take(),
+        Some(viewer) if !is_alone => viewer.view(scene, pixel, &second, &shading, &mut samples[pixel].rays),
+        _ => None,
     });
     let seen = |wi: Vec3, of_own: (Rgb, f32)| {
         std::array::from_fn::<_, BLOCK, _>(|pixel| {
@@ -276,6 +278,12 @@ fn join(
     }
 }
 
+/// A density of which products and quotients are numbers. A path whose own is none stays its pixel's alone, and no pixel has a share by one.
+#[inline]
+fn is_usual(density: f32) -> bool {
+    (1e-20..1e20).contains(&density)
+}
+
 impl Viewer<'_> {
     /// How the path's own pixel sees its second surface.
     #[inline(always)]
@@ -286,13 +294,12 @@ impl Viewer<'_> {
         trail: &Trail,
         second: &Surface<'_>,
         shading: Shading<'s>,
-    ) -> Option<View<'s>> {
+    ) -> View<'s> {
         let wo = second.wo;
         let distance_squared = second.point.distance_squared(self.surface.point);
         let density = trail.pdf * second.geometric_cosine(wo) / distance_squared;
         let from_light = self.towards(scene, -wo, trail.pdf);
-        let is_seen = density > 0.0 && density.is_finite();
-        is_seen.then_some(View { pixel, wo, f: trail.weight * density, density, from_light, shading })
+        View { pixel, wo, f: trail.weight * density, density, from_light, shading }
     }
 
     /// How another path's second surface is seen, if it is.
@@ -315,7 +322,7 @@ impl Viewer<'_> {
         let (f, pdf) = first.reflected(&self.shading, wi);
         let geometry = second.geometric_cosine(wi) / distance_squared;
         let density = pdf * geometry;
-        if f.is_black() || !(density > 0.0 && density.is_finite()) {
+        if f.is_black() || !is_usual(density) {
             return None;
         }
         let shading = second.shading_from(scene, shading, -wi)?;
