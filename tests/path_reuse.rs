@@ -5,12 +5,12 @@ mod common;
 use std::sync::Arc;
 
 use common::lit::{
-    assert_same_means, bottled, camera, clear, covered, lamp, leaning, rendered, shiny, sunny, walls,
+    assert_same_means, bottled, camera, clear, covered, facing, lamp, leaning, rendered, shiny, sunny, walls,
 };
 use common::{lambert, scene, small, sphere};
 use glam::Vec3;
 use pipeline::render::{Geometry, Prepared, replay};
-use pipeline::scene::Scene;
+use pipeline::scene::{Camera, Scene};
 use pipeline::settings::{Filter, RenderSettings, Use};
 
 /// Without either technique.
@@ -151,4 +151,27 @@ fn what_keeps_paths_from_being_reused_is_told() {
         assert!(why.contains(expected), "{why}: {expected}");
     }
     assert_eq!(why_not(&dull(), &usual), None);
+}
+
+/// A wall stands in the middle of a block, between a lit and a dark half: what is seen from one side of it must not be lit from the other.
+#[test]
+fn a_neighbour_behind_a_wall_gets_no_light_through_it() {
+    let towards = |x: f32| facing(1.0, Vec3::new(x, 1.0, 0.0), -Vec3::X * x.signum());
+    let lamp = facing(0.3, Vec3::new(0.5, 2.0, 0.0), -Vec3::Y);
+    let parts = vec![
+        (common::square(1.0, 0.0), lambert(0.5)),
+        (towards(-1.0), lambert(0.8)),
+        (towards(1.0), lambert(0.8)),
+        (towards(0.0), lambert(0.5)),
+        (lamp, common::emitting(lambert(0.0), 10.0)),
+    ];
+    let above = Camera::look_at(Vec3::Y * 5.0, Vec3::ZERO, Vec3::Z, 0.3);
+    // The middle of the picture is that of its ninth block.
+    let settings =
+        RenderSettings { path_reuse: Use::Always, ..RenderSettings { width: Some(34), ..plain(64) } };
+    let picture = rendered(&Arc::new(scene(parts, above)), &settings).raster;
+    let green = &picture.picture().rgb().expect("colour")[1];
+    let column = |x: usize| (0..24).map(|y| f64::from(green[y * 34 + x])).sum::<f64>();
+    let (dark, lit) = (column(16).min(column(17)), column(16).max(column(17)));
+    assert!(lit > 1.0 && dark < 1e-6 * lit, "{dark} {lit}");
 }
