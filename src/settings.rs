@@ -166,7 +166,7 @@ impl Integrator {
     }
 }
 
-/// A pixel filter, sampled by importance, so that every sample has the same weight and no pixel shares samples with another.
+/// A pixel filter, sampled by importance, so that every sample has the same weight and none is spread over several pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
