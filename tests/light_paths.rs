@@ -5,10 +5,10 @@ mod common;
 use std::sync::Arc;
 
 use common::lit::{
-    assert_same_means, camera, clear, lamp, leaning, mapped, rendered, shiny, submerged, sunny, walls,
+    assert_same_means, assert_same_on_any_threads, camera, clear, dull, leaning, mapped, shiny, submerged,
+    sunny, walls,
 };
-use common::{lambert, scene, small, sphere};
-use glam::Vec3;
+use common::{scene, small};
 use pipeline::render::{Geometry, Prepared};
 use pipeline::scene::Scene;
 use pipeline::settings::{Filter, RenderSettings, Use};
@@ -40,16 +40,7 @@ fn light_paths_have_the_same_bits_on_any_number_of_threads() {
     for error in [None, Some(0.02)] {
         let (light_paths, path_reuse) = (Use::Always, Use::Never);
         let settings = RenderSettings { light_paths, path_reuse, error, ..small(40, 30, 33, 6) };
-        let with_threads = |n| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
-            pool.install(|| rendered(&world, &settings))
-        };
-        let one = with_threads(1);
-        for n in [2, 5] {
-            let many = with_threads(n);
-            assert_eq!(one.raster, many.raster);
-            assert_eq!(one.counts, many.counts);
-        }
+        assert_same_on_any_threads(&world, &settings);
     }
 }
 
@@ -63,10 +54,7 @@ fn why_not(world: &Scene, settings: &RenderSettings) -> Option<String> {
 /// Whatever the seed, and whatever the number of samples.
 #[test]
 fn light_paths_are_used_where_they_pay() {
-    let mut dull = walls();
-    dull.push((sphere(0.5, Vec3::new(-0.5, 0.6, 0.0), 12), lambert(0.4)));
-    dull.push(lamp());
-    let dull = scene(dull, camera());
+    let dull = dull();
     for seed in 0..8 {
         let settings = RenderSettings { seed, ..small(80, 60, 1 << (seed % 4), 6) };
         assert_eq!(why_not(&clear(), &settings), None);

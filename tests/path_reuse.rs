@@ -5,9 +5,10 @@ mod common;
 use std::sync::Arc;
 
 use common::lit::{
-    assert_same_means, bottled, camera, clear, covered, facing, lamp, leaning, rendered, shiny, sunny, walls,
+    assert_same_means, assert_same_on_any_threads, bottled, camera, clear, covered, dull, facing, lamp,
+    leaning, rendered, shiny, sunny,
 };
-use common::{lambert, scene, small, sphere};
+use common::{lambert, scene, small};
 use glam::Vec3;
 use pipeline::render::{Geometry, Prepared, replay};
 use pipeline::scene::{Camera, Scene};
@@ -16,14 +17,6 @@ use pipeline::settings::{Filter, RenderSettings, Use};
 /// Without either technique.
 fn plain(spp: u32) -> RenderSettings {
     RenderSettings { light_paths: Use::Never, path_reuse: Use::Never, ..small(32, 24, spp, 5) }
-}
-
-/// Walls and a dull ball.
-fn dull() -> Scene {
-    let mut parts = walls();
-    parts.push((sphere(0.5, Vec3::new(-0.5, 0.6, 0.0), 12), lambert(0.4)));
-    parts.push(lamp());
-    scene(parts, camera())
 }
 
 #[test]
@@ -55,16 +48,7 @@ fn path_reuse_has_the_same_bits_on_any_number_of_threads() {
     let world = Arc::new(shiny());
     for (light_paths, error) in [(Use::Never, None), (Use::Always, None), (Use::Always, Some(0.02))] {
         let settings = RenderSettings { light_paths, path_reuse: Use::Always, error, ..small(41, 31, 33, 6) };
-        let with_threads = |n| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
-            pool.install(|| rendered(&world, &settings))
-        };
-        let one = with_threads(1);
-        for n in [2, 5] {
-            let many = with_threads(n);
-            assert_eq!(one.raster, many.raster);
-            assert_eq!(one.counts, many.counts);
-        }
+        assert_same_on_any_threads(&world, &settings);
     }
 }
 

@@ -240,3 +240,26 @@ pub(crate) fn assert_same_means(what: &str, world: &Arc<Scene>, a: &RenderSettin
     // Or the test could not fail.
     assert!(sigma < 0.003 * b, "{what}: {b} ± {sigma}");
 }
+
+/// Walls and a dull ball.
+pub(crate) fn dull() -> Scene {
+    let mut parts = walls();
+    parts.push((sphere(0.5, Vec3::new(-0.5, 0.6, 0.0), 12), lambert(0.4)));
+    parts.push(lamp());
+    scene(parts, camera())
+}
+
+/// One, two and five threads make the same picture.
+#[track_caller]
+pub(crate) fn assert_same_on_any_threads(world: &Arc<Scene>, settings: &RenderSettings) {
+    let with_threads = |n| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
+        pool.install(|| rendered(world, settings))
+    };
+    let one = with_threads(1);
+    for n in [2, 5] {
+        let many = with_threads(n);
+        assert_eq!(one.raster, many.raster);
+        assert_eq!(one.counts, many.counts);
+    }
+}
