@@ -19,8 +19,8 @@
 //! - Depth `Z` is the distance along the viewing axis, 0 where nothing was hit.
 //! - Transforms read destination first: `world_from_object`, `camera_from_world`. A camera may be a reflection.
 //! - A path's depth is its number of scattering events: `max_depth` 0 shows emission alone, 1 adds direct light.
-//! - A sample is a pure function of (seed, pixel, sample index, path vertex, dimension); the same job gives the same bits with
-//!   any number of threads.
+//! - A sample is a pure function of (seed, pixel, sample index, path vertex, dimension) and of the power of two that the samples a
+//!   pixel fit in; the same job gives the same bits with any number of threads.
 //!
 //! # Floors
 //!

@@ -96,7 +96,7 @@ const fn laine_karras(mut x: u32, seed: u32) -> u32 {
     x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// The random numbers of one camera path: a pure function of (seed, pixel, sample index, path vertex, dimension).
+/// The random numbers of one camera path: a pure function of (seed, pixel, sample index, samples a pixel, path vertex, dimension).
 ///
 /// A pixel's samples are `replicates` independently scrambled sets; sample i belongs to set i mod `replicates`.
 #[derive(Clone, Copy, Debug)]
@@ -104,6 +104,9 @@ pub struct Sampler {
     key: u64,
     index: u32,
 }
+
+/// Pixels of a square of 2^`SQUARE_BITS` columns and rows take consecutive parts of one sequence.
+const SQUARE_BITS: u32 = 2;
 
 /// What a set of four numbers decides at a path vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,12 +122,24 @@ pub enum Purpose {
 }
 
 impl Sampler {
-    /// The numbers of sample `sample` at pixel (x, y).
+    /// The numbers of sample `sample` at pixel (x, y), independent of all other pixels.
     #[inline]
     pub fn new(seed: u64, x: u32, y: u32, sample: u32, replicates: u32) -> Self {
         let replicate = sample % replicates;
         let pixel = (u64::from(y) << 32) | u64::from(x);
         Self { key: combine(combine(seed, pixel), u64::from(replicate)), index: sample / replicates }
+    }
+
+    /// The same where each pixel gets `samples`, and the pixels of a square of 4 × 4 complete each other: in the order of a Z-shaped
+    /// curve they take consecutive parts of one sequence, so that what 2 × 2 or 4 × 4 of them have together is as evenly spread as what
+    /// each has (Ahmed and Wonka 2020, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels").
+    #[inline]
+    pub fn in_square(seed: u64, (x, y): (u32, u32), sample: u32, samples: u32, replicates: u32) -> Self {
+        let square = Self::new(seed, x >> SQUARE_BITS, y >> SQUARE_BITS, sample, replicates);
+        let place: u32 =
+            (0..SQUARE_BITS).map(|bit| ((x >> bit & 1) | (y >> bit & 1) << 1) << (2 * bit)).sum();
+        let part = samples.div_ceil(replicates).next_power_of_two();
+        Self { index: place.wrapping_mul(part).wrapping_add(square.index), ..square }
     }
 
     /// Four numbers in [0, 1) that are well distributed over the samples of a replicate, independent of all other sets.
@@ -172,6 +187,42 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Sixteen pixels of four samples each, and four of them: as evenly spread as 64 and 16 samples of one.
+    #[test]
+    fn pixels_of_a_square_complete_each_other() {
+        for seed in 0..20 {
+            for (corner, side) in [((0, 0), 4u32), ((4, 8), 4), ((2, 0), 2), ((6, 6), 2), ((3, 5), 1)] {
+                for replicates in [1, 2] {
+                    let samples = 4 * replicates;
+                    let pixels = (0..side * side).map(|i| (corner.0 + i % side, corner.1 + i / side));
+                    let points = pixels.flat_map(|pixel| {
+                        (0..samples).filter(|sample| sample % replicates == 0).map(move |sample| {
+                            Sampler::in_square(seed, pixel, sample, samples, replicates)
+                                .set(1, Purpose::Light)
+                        })
+                    });
+                    let count = side * side * 4;
+                    for d in 0..4 {
+                        let mut places: Vec<u32> =
+                            points.clone().map(|p| (p[d] * count as f32) as u32).collect();
+                        places.sort_unstable();
+                        assert_eq!(places, Vec::from_iter(0..count), "seed {seed}, side {side}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn samples_in_squares_are_all_different() {
+        let places = (0..8).flat_map(|y| (0..8).map(move |x| (x, y)));
+        let all = places.flat_map(|place| (0..5).map(move |i| Sampler::in_square(7, place, i, 5, 1)));
+        let mut all: Vec<_> = all.map(|s| (s.key, s.index)).collect();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), 8 * 8 * 5);
     }
 
     /// The first two dimensions are a (0, 2)-sequence: every elementary interval of 2^-k area holds one of 2^k points.

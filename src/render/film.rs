@@ -173,9 +173,13 @@ fn developed(scene: &Prepared, tiles: impl Iterator<Item = Tile>, lit: &LightIma
 #[inline]
 pub(super) fn camera_sample(scene: &Prepared, x: u32, y: u32, sample: u32) -> (Sampler, Ray) {
     let settings = &scene.settings;
-    // Samples that are sets of their own are independent.
-    let sets = if scene.techniques.sobol { settings.effective_replicates() } else { settings.spp };
-    let sampler = Sampler::new(settings.seed, x, y, sample, sets);
+    let sampler = match scene.techniques.sobol {
+        true => {
+            Sampler::in_square(settings.seed, (x, y), sample, settings.spp, settings.effective_replicates())
+        }
+        // Samples that are sets of their own are independent.
+        false => Sampler::new(settings.seed, x, y, sample, settings.spp),
+    };
     let [u0, u1, u2, u3] = sampler.set(0, Purpose::Camera);
     let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
     let film = center + Vec2::new(scene.filter.offset(u0), scene.filter.offset(u1));

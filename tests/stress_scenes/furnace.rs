@@ -3,14 +3,13 @@
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
-use pipeline::render::{Geometry, Prepared, replay};
+use pipeline::render::{Geometry, Prepared, Techniques, replay};
 use pipeline::scene::{Camera, Mesh, Scene};
 
 use crate::common::closed::{Placement, meshes};
 use crate::common::{emitting, lambert, largest_error, mean, render_scene, scene, small, sphere};
 
 const ALBEDO: f32 = 0.5;
-/// Roulette begins after it: until then a path that stays inside has nothing random in its throughput.
 const DEPTH: u32 = 4;
 
 fn exact() -> f64 {
@@ -24,11 +23,13 @@ fn room(mesh: Mesh, eye: Vec3, to: Vec3) -> Scene {
 }
 
 /// The largest |estimate/exact - 1| of single paths that look for light by BSDF sampling alone: every vertex adds the throughput
-/// with which it was reached, so that any path that leaves or is cut short is seen.
+/// with which it was reached, so that any path that leaves or is cut short is seen. Without roulette a path that stays inside has nothing
+/// random in its throughput.
 fn worst_path(room: Scene) -> f64 {
     let geometry = Arc::new(Geometry::build(&room).expect("a tree"));
     let prepared =
         Prepared::new(Arc::new(room), geometry, &small(16, 16, 16, DEPTH)).expect("a scene to render");
+    let prepared = prepared.with(Techniques { roulette: false, ..Techniques::default() });
     let mut worst = 0.0f64;
     for (x, y) in (0..16).flat_map(|y| (0..16).map(move |x| (x, y))) {
         for sample in 0..16 {
