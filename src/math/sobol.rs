@@ -102,7 +102,8 @@ const fn laine_karras(mut x: u32, seed: u32) -> u32 {
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     key: u64,
-    index: u32,
+    /// Its place in its set, the bits in reverse.
+    reversed_index: u32,
 }
 
 /// Pixels of a square of 2^`SQUARE_BITS` columns and rows take consecutive parts of one sequence.
@@ -127,7 +128,8 @@ impl Sampler {
     pub fn new(seed: u64, x: u32, y: u32, sample: u32, replicates: u32) -> Self {
         let replicate = sample % replicates;
         let pixel = (u64::from(y) << 32) | u64::from(x);
-        Self { key: combine(combine(seed, pixel), u64::from(replicate)), index: sample / replicates }
+        let key = combine(combine(seed, pixel), u64::from(replicate));
+        Self { key, reversed_index: (sample / replicates).reverse_bits() }
     }
 
     /// The same where each pixel gets `samples`, and the pixels of a square of 4 × 4 complete each other: in the order of a Z-shaped
@@ -139,7 +141,8 @@ impl Sampler {
         let place: u32 =
             (0..SQUARE_BITS).map(|bit| ((x >> bit & 1) | (y >> bit & 1) << 1) << (2 * bit)).sum();
         let part = samples.div_ceil(replicates).next_power_of_two();
-        Self { index: place.wrapping_mul(part).wrapping_add(square.index), ..square }
+        let index = place.wrapping_mul(part).wrapping_add(sample / replicates);
+        Self { reversed_index: index.reverse_bits(), ..square }
     }
 
     /// Four numbers in [0, 1) that are well distributed over the samples of a replicate, independent of all other sets.
@@ -157,7 +160,7 @@ impl Sampler {
 
     #[inline]
     fn numbers(&self, set: u64) -> [f32; 4] {
-        let point = sobol4_reversed(laine_karras(self.index.reverse_bits(), set as u32));
+        let point = sobol4_reversed(laine_karras(self.reversed_index, set as u32));
         // Two words of 64 bits hold four seeds.
         let first = mix64((set >> 32).wrapping_add(0x9e37_79b9_7f4a_7c15));
         let second = mix64(first.wrapping_add(0x9e37_79b9_7f4a_7c15));
@@ -219,7 +222,7 @@ mod tests {
     fn samples_in_squares_are_all_different() {
         let places = (0..8).flat_map(|y| (0..8).map(move |x| (x, y)));
         let all = places.flat_map(|place| (0..5).map(move |i| Sampler::in_square(7, place, i, 5, 1)));
-        let mut all: Vec<_> = all.map(|s| (s.key, s.index)).collect();
+        let mut all: Vec<_> = all.map(|s| (s.key, s.reversed_index)).collect();
         all.sort_unstable();
         all.dedup();
         assert_eq!(all.len(), 8 * 8 * 5);

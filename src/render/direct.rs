@@ -87,12 +87,15 @@ pub(super) fn direct_light(
     if is_left_out(arriving.radiance.is_black()) {
         return Reflected::NOTHING;
     }
+    *rays += 1;
+    let passing = arriving.passing(scene, surface.medium_towards(sample.wi, arrived));
+    if is_left_out(passing.is_black()) {
+        return Reflected::NOTHING;
+    }
     let others = (!sample.is_delta()).then(|| {
         let towards = from_light.towards(scene, surface, shading, sample.wi);
         [pdf_bsdf, with_light(towards, || pdf_emission(scene, sample))].map(|pdf| pdf / sample.pdf)
     });
-    *rays += 1;
-    let passing = arriving.passing(scene, surface.medium_towards(sample.wi, arrived));
     Reflected { radiance: f * arriving.radiance * passing, pdf: sample.pdf, others }
 }
 

@@ -43,12 +43,6 @@ impl FromLight {
         }
     }
 
-    /// Light paths don't find it.
-    #[inline]
-    pub(super) fn is_none(&self) -> bool {
-        self.ratio == 0.0
-    }
-
     /// At a second surface, for a path that is weighed from there on for each that joined it there.
     #[inline]
     pub(super) fn begin_anew(&mut self, scene: &Prepared) {
@@ -64,11 +58,24 @@ impl FromLight {
         shading: &Shading<'_>,
         wi: Vec3,
     ) -> f32 {
+        self.towards_for(surface, surface.wo, wi, || surface.shading_from(scene, shading, wi))
+    }
+
+    /// The same for a path to the viewer in the direction `wo`, where the surface is seen from `wi` as `back` says.
+    #[inline]
+    pub(super) fn towards_for<'s>(
+        &self,
+        surface: &Surface<'_>,
+        wo: Vec3,
+        wi: Vec3,
+        back: impl FnOnce() -> Option<Shading<'s>>,
+    ) -> f32 {
         if self.ratio == 0.0 {
             return 0.0;
         }
-        let cosines = surface.geometric_cosine(wi) / surface.geometric_cosine(surface.wo);
-        let back = if self.scatterings == 0 { 1.0 } else { pdf_back(scene, surface, shading, wi) };
+        let cosines = surface.geometric_cosine(wi) / surface.geometric_cosine(wo);
+        let pdf_back = || back().map_or(0.0, |b| b.bsdf.pdf(b.wo, b.frame.local_from_world(wo)));
+        let back = if self.scatterings == 0 { 1.0 } else { pdf_back() };
         self.ratio * cosines * back
     }
 
@@ -107,14 +114,6 @@ impl FromLight {
 #[inline]
 pub(super) fn with_light(ratio: f32, emission: impl FnOnce() -> f32) -> f32 {
     if ratio > 0.0 { (ratio * emission()).max(0.0) } else { 0.0 }
-}
-
-/// The density with which a path from `wi` is scattered to the viewer.
-#[inline]
-fn pdf_back(scene: &Prepared, surface: &Surface<'_>, shading: &Shading<'_>, wi: Vec3) -> f32 {
-    surface
-        .shading_from(scene, shading, wi)
-        .map_or(0.0, |back| back.bsdf.pdf(back.wo, back.frame.local_from_world(surface.wo)))
 }
 
 /// Whether a delta lobe that sends a path to `wi` sends one from there to the viewer.

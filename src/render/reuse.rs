@@ -245,10 +245,12 @@ fn join(
         _ => None,
     });
     let seen = |wi: Vec3, of_own: (Rgb, f32)| {
+        // Light paths come to all viewers from the same side.
+        let back = if scene.light_paths.is_ok() { second.shading_from(scene, &shading, wi) } else { None };
         std::array::from_fn::<_, BLOCK, _>(|pixel| {
             let view = views[pixel].as_ref()?;
             let reflected = if pixel == own { of_own } else { second.reflected(&view.shading, wi) };
-            view.seen(scene, &second, wi, reflected)
+            view.seen(&second, wi, reflected, back)
         })
     };
     let strategies = Strategies::of(scene);
@@ -344,19 +346,16 @@ impl Viewer<'_> {
 }
 
 impl<'a> View<'a> {
-    /// How it sees light from `wi`, if any is reflected.
+    /// How it sees light from `wi`, if any is reflected; from there the second surface is seen as `back` says.
     #[inline(always)]
     fn seen(
         &self,
-        scene: &Prepared,
         second: &Surface<'_>,
         wi: Vec3,
         (f, pdf): (Rgb, f32),
+        back: Option<Shading<'a>>,
     ) -> Option<Seen<'_, 'a>> {
-        let towards = || match self.from_light.is_none() {
-            true => 0.0,
-            false => self.from_light.towards(scene, &second.seen_from(self.wo), &self.shading, wi),
-        };
+        let towards = || self.from_light.towards_for(second, self.wo, wi, || back);
         (!f.is_black()).then(|| Seen { view: self, f, pdf, towards: towards() })
     }
 }

@@ -65,7 +65,7 @@ impl<'a> Surface<'a> {
     /// The same place as it is seen from the unit direction `wo`.
     #[inline]
     pub(super) fn seen_from(&self, wo: Vec3) -> Self {
-        Self { wo, is_front: wo.dot(self.normal) >= 0.0, ..*self }
+        Self { wo, is_front: self.is_before(wo), ..*self }
     }
 
     /// |cos| between a unit direction and the geometric normal.
@@ -112,17 +112,22 @@ impl<'a> Surface<'a> {
         }
         let side = if self.is_front || is_interface { 1.0 } else { -1.0 };
         let frame = self.frame_around(scene, self.at.shading_normal(self.normal) * side);
-        if self.faces(frame.normal) {
+        if self.shows(frame.normal, self.wo, self.is_front) {
             return Some((frame, self.material.has_normal_map()));
         }
         let is_black = one_sided && !is_interface;
         (!is_black).then(|| (Frame::from_normal(self.normal * side), true))
     }
 
-    /// The viewer sees the side that a shading normal says it sees.
+    /// A viewer in the direction `w`, before the geometric front or not, sees the side that a shading normal says it sees.
     #[inline]
-    fn faces(&self, normal: Vec3) -> bool {
-        (self.wo.dot(normal) > 0.0) == (self.is_front || !self.material.is_interface)
+    fn shows(&self, normal: Vec3, w: Vec3, is_front: bool) -> bool {
+        (w.dot(normal) > 0.0) == (is_front || !self.material.is_interface)
+    }
+
+    #[inline]
+    fn is_before(&self, w: Vec3) -> bool {
+        w.dot(self.normal) >= 0.0
     }
 
     /// How this place, seen as `shading` says, is seen from the direction `w`: in the same frame, unless frames depend on the viewer. None
@@ -134,13 +139,11 @@ impl<'a> Surface<'a> {
         shading: &Shading<'s>,
         w: Vec3,
     ) -> Option<Shading<'s>> {
-        let turned = self.seen_from(w);
-        let is_same_side = turned.is_front == self.is_front || self.material.is_interface;
+        let is_front = self.is_before(w);
+        let is_same_side = is_front == self.is_front || self.material.is_interface;
+        let is_same = !shading.is_turned && is_same_side && self.shows(shading.frame.normal, w, is_front);
         let (frame, is_turned) =
-            match !shading.is_turned && is_same_side && turned.faces(shading.frame.normal) {
-                true => (shading.frame, false),
-                false => turned.frame(scene)?,
-            };
+            if is_same { (shading.frame, false) } else { self.seen_from(w).frame(scene)? };
         Some(Shading { frame, bsdf: shading.bsdf, wo: frame.local_from_world(w), is_turned })
     }
 
