@@ -131,7 +131,7 @@ fn environment_sample(bencher: Bencher<'_, '_>) {
     let environment = environment();
     bencher.bench(|| {
         for call in 0..BATCH {
-            black_box(environment.sample([unit(call, 0), unit(call, 1)]));
+            black_box(environment.sample(Some(Vec3::Y), [unit(call, 0), unit(call, 1)], [0.5; 2]));
         }
     });
 }
@@ -142,7 +142,8 @@ fn environment_look_up_with_pdf(bencher: Bencher<'_, '_>) {
     let directions: Vec<Vec3> = (0..BATCH).map(|call| anywhere(call, 0).normalize()).collect();
     bencher.bench(|| {
         for &wi in &directions {
-            black_box(environment.radiance_with_pdf(wi));
+            let place = environment.place(wi);
+            black_box((environment.radiance_at(place), environment.pdf(Some(Vec3::Y), place)));
         }
     });
 }

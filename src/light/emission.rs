@@ -7,7 +7,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
 
 use super::patch::Patch;
-use super::{Distribution, Lights, NearLight};
+use super::{Distribution, Lights, NearLight, SkyPlace};
 use crate::color::Rgb;
 use crate::math::{Frame, warp};
 use crate::scene::material::Sides;
@@ -36,8 +36,8 @@ pub enum Emission {
         radiance: Rgb,
         /// Per steradian, and per m² across the direction.
         pdf: f32,
-        /// The density per steradian with which [`Lights::sample`] finds it.
-        pdf_light: f32,
+        /// Where that is.
+        sky: SkyPlace,
     },
 }
 
@@ -77,14 +77,15 @@ impl Lights {
     pub fn emit(&self, [u0, u1, u_light, u_side]: [f32; 4], u_disk: [f32; 2]) -> Option<Emission> {
         let (index, _) = self.emitters.choice.sample(u_light)?;
         if index == self.emitters.environment {
-            let (wi, radiance, _) = self.environment.as_ref()?.sample([u0, u1])?;
-            let (_, pdf_light) = self.environment(wi)?;
+            let environment = self.environment.as_ref()?;
+            let (wi, radiance, _) = environment.sample(None, [u0, u1], [u_side, u_side])?;
+            let sky = environment.place(wi);
             let [x, y] = warp::concentric_disk(u_disk);
             let frame = Frame::from_normal(wi);
             let across = frame.tangent * x + frame.bitangent * y;
             let origin = self.emitters.center + (across + wi) * self.emitters.radius;
-            let pdf = self.pdf_emission_far(pdf_light);
-            return Some(Emission::Far { origin, wi, radiance, pdf, pdf_light });
+            let pdf = self.pdf_emission_far(sky);
+            return Some(Emission::Far { origin, wi, radiance, pdf, sky });
         }
         let NearLight::Patch(patch) = self.near.get(index)? else { return None };
         let (triangle, barycentric) = patch.point([u0, u1]);
@@ -104,9 +105,10 @@ impl Lights {
         self.emitters.choice.probability(index) * sides * patch.pdf_point() * FRAC_1_PI
     }
 
-    /// The density of [`Emission::Far`] in a direction in which [`Lights::environment`] is chosen with the density `pdf`.
+    /// The density of [`Emission::Far`] from a place of the environment.
     #[inline]
-    pub fn pdf_emission_far(&self, pdf: f32) -> f32 {
+    pub fn pdf_emission_far(&self, place: SkyPlace) -> f32 {
+        let pdf = self.pdf_sky(None, place);
         if pdf > 0.0 { pdf * self.emitters.per_choice } else { 0.0 }
     }
 }

@@ -22,6 +22,10 @@ pub struct EnvironmentLight {
     sampled_luminance: f64,
 }
 
+/// A direction of an environment, as its image counts: fractions of a turn and of the polar angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyPlace(Vec2);
+
 #[derive(Debug)]
 enum Map {
     Constant,
@@ -77,40 +81,46 @@ impl EnvironmentLight {
 
     /// The radiance that arrives from the unit direction `wi`.
     pub fn radiance(&self, wi: Vec3) -> Rgb {
-        match &self.map {
-            Map::Constant => self.scale,
-            Map::Image(map) => map.interpolate(map.coordinates(wi)) * self.scale,
-        }
+        self.radiance_at(self.place(wi))
     }
 
-    /// A direction with its radiance and its density per unit solid angle.
-    pub fn sample(&self, u: [f32; 2]) -> Option<(Vec3, Rgb, f32)> {
+    /// A direction with its radiance and its density per unit solid angle, for light that falls on a surface of unit `normal`, or on none:
+    /// from everywhere. `digits` continue those of `u`.
+    pub fn sample(&self, normal: Option<Vec3>, u: [f32; 2], digits: [f32; 2]) -> Option<(Vec3, Rgb, f32)> {
         match &self.map {
             Map::Constant => {
                 let wi: Vec3 = warp::uniform_sphere(u).into();
                 Some((wi, self.scale, 1.0 / (4.0 * PI)))
             }
             Map::Image(map) => {
-                let (azimuth, cos_theta, pdf) = map.table.sample(u)?;
+                let (azimuth, cos_theta, pdf) = map.table.sample(map.turned(normal), u, digits)?;
                 let wi = map.direction(azimuth, cos_theta).normalize();
                 Some((wi, self.radiance(wi), pdf))
             }
         }
     }
 
-    /// The density of [`Self::sample`] per unit solid angle.
-    pub fn pdf(&self, wi: Vec3) -> f32 {
-        self.radiance_with_pdf(wi).1
+    /// Where a unit direction is.
+    pub fn place(&self, wi: Vec3) -> SkyPlace {
+        match &self.map {
+            Map::Constant => SkyPlace(Vec2::ZERO),
+            Map::Image(map) => SkyPlace(map.coordinates(wi)),
+        }
     }
 
-    /// [`Self::radiance`] and [`Self::pdf`].
-    pub fn radiance_with_pdf(&self, wi: Vec3) -> (Rgb, f32) {
+    /// The radiance that arrives from a place.
+    pub fn radiance_at(&self, SkyPlace(uv): SkyPlace) -> Rgb {
         match &self.map {
-            Map::Constant => (self.scale, 1.0 / (4.0 * PI)),
-            Map::Image(map) => {
-                let uv = map.coordinates(wi);
-                (map.interpolate(uv) * self.scale, map.table.pdf(uv.x, uv.y))
-            }
+            Map::Constant => self.scale,
+            Map::Image(map) => map.interpolate(uv) * self.scale,
+        }
+    }
+
+    /// The density of [`Self::sample`] per unit solid angle.
+    pub fn pdf(&self, normal: Option<Vec3>, SkyPlace(uv): SkyPlace) -> f32 {
+        match &self.map {
+            Map::Constant => 1.0 / (4.0 * PI),
+            Map::Image(map) => map.table.pdf(map.turned(normal), uv.x, uv.y),
         }
     }
 }
@@ -147,6 +157,16 @@ impl ImageMap {
             }
         };
         Vec2::new(u, Real::acos(cos_theta.clamp(-1.0, 1.0)) / PI)
+    }
+
+    /// A surface's normal where the table has its directions.
+    #[inline]
+    fn turned(&self, normal: Option<Vec3>) -> Option<Vec3> {
+        let [sin, cos] = self.rotation;
+        normal.map(|n| match self.mapping {
+            Equirectangular::YUp => Vec3::new(n.z * sin - n.x * cos, -(n.x * sin + n.z * cos), n.y),
+            Equirectangular::Aris => Vec3::new(-(n.x * cos + n.y * sin), n.y * cos - n.x * sin, n.z),
+        })
     }
 
     fn direction(&self, u: f32, cos_theta: f32) -> Vec3 {
@@ -190,26 +210,64 @@ mod tests {
         unit_f32(combine(u64::from(i), salt) as u32)
     }
 
-    /// Both sides of E[f/pdf] = ∫ f: with a sun of one pixel, black halves and both mappings.
+    /// Light from all sides, and on surfaces that face all ways.
+    fn normals() -> impl Iterator<Item = Option<Vec3>> {
+        let some = (0..12).map(|i| Some(warp::uniform_sphere([random(i, 7), random(i, 8)]).into()));
+        std::iter::once(None).chain(some)
+    }
+
+    /// Both sides of E[f/pdf] = ∫ f: with a sun of one pixel, black halves and both mappings; of an image of few cells and one of several in each
+    /// region.
     #[test]
     fn sampled_and_uniform_integrals_agree() {
-        let picture =
-            image(16, 8, |x, y| if (x, y) == (5, 2) { 500.0 } else { (x % 3) as f32 * f32::from(y < 5) });
-        for mapping in [Equirectangular::YUp, Equirectangular::Aris] {
-            let light = light(&picture, mapping, 0.7);
-            let f = |wi: Vec3| f64::from(light.radiance(wi).r) * f64::from(wi.x + 1.5);
-            let n = 200_000;
-            let uniform: f64 =
-                (0..n).map(|i| f(warp::uniform_sphere([random(i, 1), random(i, 2)]).into())).sum::<f64>()
-                    * 4.0
+        let value = |(x, y): (u32, u32), sun: (u32, u32), rows: u32| {
+            if (x, y) == sun { 500.0 } else { (x % 3) as f32 * f32::from(y < rows) }
+        };
+        let coarse = image(16, 8, |x, y| value((x, y), (5, 2), 5));
+        let fine = image(150, 75, |x, y| value((x, y), (40, 30), 45));
+        for (picture, mapping) in [
+            (&coarse, Equirectangular::YUp),
+            (&coarse, Equirectangular::Aris),
+            (&fine, Equirectangular::YUp),
+            (&fine, Equirectangular::Aris),
+        ] {
+            let light = light(picture, mapping, 0.7);
+            for normal in normals() {
+                let cosine = |wi: Vec3| normal.map_or(1.0, |n| n.dot(wi).max(0.0));
+                let f = |wi: Vec3| {
+                    f64::from(light.radiance(wi).r) * f64::from(wi.x + 1.5) * f64::from(cosine(wi))
+                };
+                // Even over the image, so that none of its pixels is missed.
+                let (columns, rows) = (picture.width * 8, picture.height * 8);
+                let uniform: f64 = (0..columns * rows)
+                    .map(|i| {
+                        let (u, v) = ((i % columns) as f32 + 0.5, (i / columns) as f32 + 0.5);
+                        let theta = v / rows as f32 * PI;
+                        let map = match &light.map {
+                            Map::Image(map) => map,
+                            Map::Constant => panic!("an image"),
+                        };
+                        let wi = map.direction(u / columns as f32, Real::cos(theta));
+                        f(wi) * f64::from(Real::sin(theta))
+                    })
+                    .sum::<f64>()
+                    * 2.0
                     * std::f64::consts::PI
+                    * std::f64::consts::PI
+                    / f64::from(columns * rows);
+                let n = 20_000;
+                let sampled: f64 = (0..n)
+                    .filter_map(|i| {
+                        light.sample(normal, [random(i, 3), random(i, 4)], [random(i, 5), random(i, 6)])
+                    })
+                    .map(|(wi, _, pdf)| f(wi) / f64::from(pdf))
+                    .sum::<f64>()
                     / f64::from(n);
-            let sampled: f64 = (0..n)
-                .filter_map(|i| light.sample([random(i, 3), random(i, 4)]))
-                .map(|(wi, _, pdf)| f(wi) / f64::from(pdf))
-                .sum::<f64>()
-                / f64::from(n);
-            assert!((uniform - sampled).abs() < 0.03 * sampled, "{mapping:?}: {uniform} {sampled}");
+                assert!(
+                    (uniform - sampled).abs() < 0.03 * uniform,
+                    "{mapping:?} {normal:?}: {uniform} {sampled}"
+                );
+            }
         }
     }
 
@@ -234,13 +292,15 @@ mod tests {
         let picture = image(32, 16, |x, y| (x + y * y) as f32);
         for mapping in [Equirectangular::YUp, Equirectangular::Aris] {
             let light = light(&picture, mapping, -1.2);
-            let mut off = 0;
-            for i in 0..2000 {
-                let (wi, _, pdf) = light.sample([random(i, 3), random(i, 4)]).unwrap();
-                // Rounding may carry a direction over a cell's edge.
-                off += u32::from((light.pdf(wi) - pdf).abs() > 1e-3 * pdf);
+            for normal in normals() {
+                let mut off = 0;
+                for i in 0..2000 {
+                    let (wi, _, pdf) = light.sample(normal, [random(i, 3), random(i, 4)], [0.5; 2]).unwrap();
+                    // Rounding may carry a direction over a cell's edge.
+                    off += u32::from((light.pdf(normal, light.place(wi)) - pdf).abs() > 1e-3 * pdf);
+                }
+                assert!(off < 4, "{mapping:?} {normal:?}: {off}");
             }
-            assert!(off < 4, "{mapping:?}: {off}");
         }
     }
 
@@ -250,7 +310,10 @@ mod tests {
         let light = light(&picture, Equirectangular::YUp, 0.0);
         for i in 0..5000 {
             let wi: Vec3 = warp::uniform_sphere([random(i, 1), random(i, 2)]).into();
-            assert!(light.radiance(wi).r == 0.0 || light.pdf(wi) > 0.0, "{wi}");
+            for normal in normals() {
+                let is_seen = light.radiance(wi).r > 0.0 && normal.is_none_or(|n| n.dot(wi) > 0.0);
+                assert!(!is_seen || light.pdf(normal, light.place(wi)) > 0.0, "{wi} {normal:?}");
+            }
         }
     }
 

@@ -3,9 +3,11 @@
 use std::f32::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use glam::Vec3;
 use rayon::prelude::*;
 
-use super::Distribution;
+use super::facing::{self, Facing, angle};
+use super::grid::Grid;
 use crate::color::Rgb;
 use crate::math::Real;
 use crate::scene::Image;
@@ -14,18 +16,36 @@ use crate::scene::texture::{Encoding, Wrap};
 
 /// Cells of equal azimuth and rows of polar angle, between whose corners the interpolated image is simple enough to be
 /// integrated exactly. It depends on the image and the mapping alone, not on how the environment is turned or tinted.
+///
+/// Cells are gathered into regions. How light is spread within one is the same for all; which region is chosen depends on the way that the
+/// surface faces, by the light times its mean cosine there. So what lies behind a surface is never chosen, and a bright sun there takes
+/// nothing from the sky before it.
 #[derive(Debug)]
 pub struct EnvironmentTable {
     columns: usize,
     /// Cosines of the polar angle between rows, from 1 down to -1.
     row_cosines: Vec<f32>,
-    rows: Distribution,
-    in_row: Vec<Distribution>,
+    /// The first column and row of each region, and the end.
+    region_columns: Vec<usize>,
+    region_rows: Vec<usize>,
+    /// Which region: of light as it is seen from all sides.
+    from_everywhere: Grid,
+    /// Which, for surfaces of each [`super::facing`].
+    by_facing: Vec<Grid>,
+    /// Which cell of a region, row by row.
+    in_region: Vec<Grid>,
     /// ∫ radiance dω by channel, to the accuracy of one row's height.
     total: [f64; 3],
     /// How much of the luminance is left for the table to find.
     share: f64,
 }
+
+/// Regions are at most so many.
+const REGION_COLUMNS: usize = 64;
+const REGION_ROWS: usize = 32;
+
+/// Of light that falls on a surface, this part of its mean is left to BSDF sampling.
+const LEFT_TO_BSDF: f64 = 0.5;
 
 /// What else finds the light that a table is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,22 +86,53 @@ impl EnvironmentTable {
             })
             .unzip();
         let total = [0, 1, 2].map(|channel| sums.iter().map(|row| row[channel]).sum::<f64>());
-        let expected = match partner {
-            Partner::None => 0.0,
-            Partner::Bsdf => luminance(total) / (4.0 * std::f64::consts::PI),
-        };
-        let (in_row, weights): (Vec<Distribution>, Vec<f64>) = luminances
+        let row_cosines: Vec<f32> = (0..=row_count).map(|row| polar_cosine(row) as f32).collect();
+        let region_columns = bounds(columns, REGION_COLUMNS);
+        let region_rows = bounds(row_count, REGION_ROWS);
+        let power = |row: usize, cell: &f32| f64::from(cell.max(0.0)) * band(row) * cell_azimuth;
+        let in_region = (0..region_rows.len() - 1)
             .into_par_iter()
-            .enumerate()
-            .map(|(row, cells)| {
-                let weights: Vec<f64> = cells.iter().map(|&c| (f64::from(c) - expected).max(0.0)).collect();
-                (Distribution::new(&weights), weights.iter().sum::<f64>() * band(row) * cell_azimuth)
+            .flat_map_iter(|row| (0..region_columns.len() - 1).map(move |column| (row, column)));
+        let (regions, in_region): (Vec<Region>, Vec<Grid>) = in_region
+            .map(|(row, column)| {
+                let rows = region_rows[row]..region_rows[row + 1];
+                let inside = region_columns[column]..region_columns[column + 1];
+                let cells: Vec<Vec<f64>> = rows
+                    .clone()
+                    .map(|row| luminances[row][inside.clone()].iter().map(|c| power(row, c)).collect())
+                    .collect();
+                let turn = |column: usize| (column as f64 / columns as f64) as f32;
+                let turns = [turn(inside.start), turn(inside.end)];
+                let cosines = [row_cosines[rows.start], row_cosines[rows.end]];
+                let solid_angle = rows.map(band).sum::<f64>() * cell_azimuth * inside.len() as f64;
+                let power = cells.iter().flatten().sum();
+                (Region::new(power, solid_angle, turns, cosines), Grid::new(&cells))
             })
             .unzip();
-        let sampled = weights.iter().sum::<f64>();
+        let regions = Regions { all: regions, columns: region_columns.len() - 1 };
+        let left = |part: f64| if partner == Partner::Bsdf { part } else { 0.0 };
+        let weights = regions.weights(left(1.0), |_| 1.0);
+        let (from_everywhere, sampled) = (regions.grid(&weights), weights.iter().sum::<f64>());
         let share = if sampled > ROUNDING * luminance(total) { sampled / luminance(total) } else { 0.0 };
-        let row_cosines = (0..=row_count).map(|row| polar_cosine(row) as f32).collect();
-        Self { columns, row_cosines, rows: Distribution::new(&weights), in_row, total, share }
+        let by_facing = (0..facing::COUNT)
+            .into_par_iter()
+            .map(|cell| {
+                let facing = Facing::new(cell);
+                let cosine = |r: &Region| f64::from(facing.mean_cosine(r.middle, &r.some, r.radius));
+                regions.grid(&regions.weights(left(LEFT_TO_BSDF), cosine))
+            })
+            .collect();
+        Self {
+            columns,
+            row_cosines,
+            region_columns,
+            region_rows,
+            from_everywhere,
+            by_facing,
+            in_region,
+            total,
+            share,
+        }
     }
 
     /// ∫ luminance dω of the image tinted by `scale`, to the accuracy of one row's height.
@@ -95,36 +146,127 @@ impl EnvironmentTable {
         self.share
     }
 
-    /// Azimuth as a fraction of a turn, cosine of the polar angle, and density per unit solid angle.
+    /// Azimuth as a fraction of a turn, cosine of the polar angle, and density per unit solid angle, of light that falls on a surface of unit
+    /// `normal` ([`direction`]), or on none. `digits` continue those of `u`.
     #[inline]
-    pub(super) fn sample(&self, u: [f32; 2]) -> Option<(f32, f32, f32)> {
-        let (row, _, in_row) = self.rows.sample_with_rest(u[1])?;
-        let (column, _, in_column) = self.in_row[row].sample_with_rest(u[0])?;
+    pub(super) fn sample(
+        &self,
+        normal: Option<Vec3>,
+        u: [f32; 2],
+        digits: [f32; 2],
+    ) -> Option<(f32, f32, f32)> {
+        let region = self.regions(normal).sample(u, digits)?;
+        let in_region = &self.in_region[self.region_index(region.column, region.row)];
+        let cell = in_region.sample(region.rest, digits)?;
+        let column = self.region_columns[region.column] + cell.column;
+        let row = self.region_rows[region.row] + cell.row;
+        let pdf = self.per_solid_angle(row, region.probability * cell.probability);
         let (top, bottom) = (self.row_cosines[row], self.row_cosines[row + 1]);
-        let pdf = self.cell_pdf(column, row);
-        let azimuth = (column as f32 + in_column) / self.columns as f32;
-        (pdf > 0.0).then_some((azimuth, top + (bottom - top) * in_row, pdf))
+        let azimuth = (column as f32 + cell.rest[0]) / self.columns as f32;
+        (pdf > 0.0).then_some((azimuth, top + (bottom - top) * cell.rest[1], pdf))
     }
 
     /// The density at fractions of a turn and of the polar angle.
     #[inline]
-    pub(super) fn pdf(&self, u: f32, v: f32) -> f32 {
+    pub(super) fn pdf(&self, normal: Option<Vec3>, u: f32, v: f32) -> f32 {
+        let rows = self.row_cosines.len() - 1;
         let column = ((u * self.columns as f32) as usize).min(self.columns - 1);
-        let row = ((v * self.in_row.len() as f32) as usize).min(self.in_row.len() - 1);
-        self.cell_pdf(column, row)
+        let row = ((v * rows as f32) as usize).min(rows - 1);
+        let (region_column, region_row) =
+            (part_of(column, self.columns, REGION_COLUMNS), part_of(row, rows, REGION_ROWS));
+        let in_region = &self.in_region[self.region_index(region_column, region_row)]
+            .probability(column - self.region_columns[region_column], row - self.region_rows[region_row]);
+        let region = self.regions(normal).probability(region_column, region_row);
+        self.per_solid_angle(row, region * in_region)
     }
 
-    /// Constant over a cell, per unit solid angle.
     #[inline]
-    fn cell_pdf(&self, column: usize, row: usize) -> f32 {
+    fn regions(&self, normal: Option<Vec3>) -> &Grid {
+        normal.and_then(facing::cell_of).map_or(&self.from_everywhere, |cell| &self.by_facing[cell])
+    }
+
+    #[inline]
+    fn region_index(&self, column: usize, row: usize) -> usize {
+        row * (self.region_columns.len() - 1) + column
+    }
+
+    /// The density in a cell of a row, over which it is constant.
+    #[inline]
+    fn per_solid_angle(&self, row: usize, probability: f32) -> f32 {
         let solid_angle = (self.row_cosines[row] - self.row_cosines[row + 1]) * TAU / self.columns as f32;
         // At the poles of an image of thousands of rows the band is empty in f32.
-        if solid_angle > 0.0 {
-            self.rows.probability(row) * self.in_row[row].probability(column) / solid_angle
-        } else {
-            0.0
+        if solid_angle > 0.0 { probability / solid_angle } else { 0.0 }
+    }
+}
+
+/// All regions, row by row.
+struct Regions {
+    all: Vec<Region>,
+    columns: usize,
+}
+
+impl Regions {
+    /// What each has of the luminance that exceeds `left` times the mean, where all counts by a cosine.
+    fn weights(&self, left: f64, cosine: impl Fn(&Region) -> f64) -> Vec<f64> {
+        let cosines: Vec<f64> = self.all.iter().map(cosine).collect();
+        let sum = |of: fn(&Region) -> f64| -> f64 {
+            self.all.iter().zip(&cosines).map(|(region, cosine)| of(region) * cosine).sum()
+        };
+        let left = left * sum(|region| region.power) / sum(|region| region.solid_angle);
+        let excess = |region: &Region| (region.power - left * region.solid_angle).max(0.0);
+        self.all.iter().zip(&cosines).map(|(region, cosine)| excess(region) * cosine).collect()
+    }
+
+    /// The choice by as many weights.
+    fn grid(&self, weights: &[f64]) -> Grid {
+        Grid::new(&weights.chunks(self.columns).map(<[f64]>::to_vec).collect::<Vec<_>>())
+    }
+}
+
+/// What regions are chosen by.
+struct Region {
+    /// ∫ luminance dω.
+    power: f64,
+    solid_angle: f64,
+    middle: Vec3,
+    /// The middles of its quarters.
+    some: [Vec3; 4],
+    /// How far it reaches from the middle, in radians.
+    radius: f32,
+}
+
+impl Region {
+    fn new(power: f64, solid_angle: f64, turns: [f32; 2], cosines: [f32; 2]) -> Self {
+        let between = |[a, b]: [f32; 2], t: f32| a * (1.0 - t) + b * t;
+        let at = |s: f32, t: f32| direction(between(turns, s), between(cosines, t));
+        let ends = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let middle = at(0.5, 0.5);
+        Self {
+            power,
+            solid_angle,
+            middle,
+            some: ends.map(|(s, t)| at(0.25 + 0.5 * s, 0.25 + 0.5 * t)),
+            radius: ends.map(|(s, t)| angle(middle, at(s, t))).into_iter().fold(0.0, f32::max),
         }
     }
+}
+
+/// The direction at a fraction of a turn and a cosine of the polar angle, where the pole is z.
+fn direction(turn: f32, cosine: f32) -> Vec3 {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    Vec3::new(sine * Real::cos(TAU * turn), sine * Real::sin(TAU * turn), cosine)
+}
+
+/// Where as many parts of `count` things begin as there may be, and the end.
+fn bounds(count: usize, most: usize) -> Vec<usize> {
+    let parts = count.min(most);
+    (0..=parts).map(|part| (part * count).div_ceil(parts)).collect()
+}
+
+/// The part that thing `index` is in.
+#[inline]
+fn part_of(index: usize, count: usize, most: usize) -> usize {
+    index * count.min(most) / count
 }
 
 fn luminance([r, g, b]: [f64; 3]) -> f64 {
@@ -168,7 +310,7 @@ struct Kept {
     table: Arc<EnvironmentTable>,
 }
 
-/// So many tables are kept: each is as large as its image.
+/// So many tables are kept: each is about as large as its image.
 const MOST_KEPT: usize = 4;
 
 impl EnvironmentTables {
@@ -238,7 +380,7 @@ mod tests {
             for partner in [Partner::None, Partner::Bsdf] {
                 let table = EnvironmentTable::new(&sky, mapping, partner);
                 let n = 400_000;
-                let sum: f64 = (0..n).map(anywhere).map(|(u, v)| f64::from(table.pdf(u, v))).sum();
+                let sum: f64 = (0..n).map(anywhere).map(|(u, v)| f64::from(table.pdf(None, u, v))).sum();
                 let integral = sum * 4.0 * std::f64::consts::PI / f64::from(n);
                 assert!((integral - 1.0).abs() < 0.02, "{mapping:?} {partner:?}: {integral}");
             }
@@ -250,16 +392,37 @@ mod tests {
         // Rows of 1 above and 3 below: the mean is 2, and each row of cells is even but for the four next to the middle.
         let halves = image(|_, y| if y < 4 { 1.0 } else { 3.0 });
         let table = EnvironmentTable::new(&halves, Equirectangular::YUp, Partner::Bsdf);
-        assert_eq!(table.pdf(0.3, 0.1), 0.0);
-        assert!(table.pdf(0.3, 0.9) > 0.0);
+        assert_eq!(table.pdf(None, 0.3, 0.1), 0.0);
+        assert!(table.pdf(None, 0.3, 0.9) > 0.0);
         // Of 3 - 2 on half of the sphere; of 2.75 - 2 in the row next to the middle, where both are blended.
         let blended = Real::cos(3.0 * std::f64::consts::PI / 8.0);
         let share = ((1.0 - blended) + 0.75 * blended) / 4.0;
         assert!((table.share() - share).abs() < 1e-6, "{} {share}", table.share());
         let alone = EnvironmentTable::new(&halves, Equirectangular::YUp, Partner::None);
-        assert!(alone.pdf(0.3, 0.1) > 0.0 && (alone.share() - 1.0).abs() < 1e-6);
+        assert!(alone.pdf(None, 0.3, 0.1) > 0.0 && (alone.share() - 1.0).abs() < 1e-6);
         let even = EnvironmentTable::new(&image(|_, _| 0.7), Equirectangular::YUp, Partner::Bsdf);
         assert_eq!(even.share(), 0.0);
+    }
+
+    /// A sun below, and a dim sky: a floor is lit by the sky, and a ceiling by the sun.
+    #[test]
+    fn what_lies_behind_a_surface_is_not_sampled_for_it() {
+        let sky = image(|x, y| if (x, y) == (5, 6) { 5000.0 } else { 1.0 });
+        let table = EnvironmentTable::new(&sky, Equirectangular::YUp, Partner::Bsdf);
+        let sun = (5.5 / 16.0, 6.5 / 8.0);
+        assert!(table.pdf(None, sun.0, sun.1) > 1.0);
+        assert_eq!(table.pdf(None, 0.3, 0.2), 0.0, "below the mean");
+        let chosen = |normal: Vec3| {
+            let sample = |i| table.sample(Some(normal), [random(i, 3), random(i, 4)], [0.5; 2]);
+            (0..1000)
+                .map(|i| sample(i).expect("a direction").1)
+                .fold((1.0f32, -1.0f32), |(low, high), cosine| (low.min(cosine), high.max(cosine)))
+        };
+        assert_eq!(table.pdf(Some(Vec3::Z), sun.0, sun.1), 0.0);
+        assert!(table.pdf(Some(Vec3::Z), 0.3, 0.2) > 0.1);
+        assert!(chosen(Vec3::Z).0 > -0.4 && chosen(Vec3::Z).1 > 0.9, "{:?}", chosen(Vec3::Z));
+        assert!(table.pdf(Some(-Vec3::Z), sun.0, sun.1) > 1.0);
+        assert!(chosen(-Vec3::Z).1 < -0.3, "{:?}", chosen(-Vec3::Z));
     }
 
     #[test]

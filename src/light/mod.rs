@@ -8,6 +8,8 @@ mod distribution;
 mod emission;
 mod environment;
 mod environment_table;
+mod facing;
+mod grid;
 mod patch;
 mod punctual;
 mod tree;
@@ -26,7 +28,7 @@ use tree::LightTree;
 
 pub use distribution::Distribution;
 pub use emission::Emission;
-pub use environment::EnvironmentLight;
+pub use environment::{EnvironmentLight, SkyPlace};
 pub use environment_table::{EnvironmentTable, EnvironmentTables, Partner};
 
 /// An emitting triangle in world space.
@@ -101,7 +103,7 @@ impl LightSample {
     /// The light has no extent: no other strategy finds it.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        matches!(self.place, LightPlace::Point { .. } | LightPlace::Far { is_delta: true, .. })
+        matches!(self.place, LightPlace::Point { .. } | LightPlace::Far { sky: None, .. })
     }
 }
 
@@ -126,8 +128,8 @@ pub enum LightPlace {
     Far {
         /// What arrives.
         radiance: Rgb,
-        /// The light has no extent: no other strategy finds it.
-        is_delta: bool,
+        /// Where in the environment; a light without extent, which no other strategy finds, is in none.
+        sky: Option<SkyPlace>,
     },
 }
 
@@ -205,8 +207,10 @@ impl Lights {
         if let Some(light) = self.far.get(group - 1) {
             return punctual::sample(light, receiver.point, share);
         }
-        let (wi, radiance, pdf) = self.environment.as_ref()?.sample([u0, u1])?;
-        Some(LightSample { wi, place: LightPlace::Far { radiance, is_delta: false }, pdf: share * pdf })
+        let environment = self.environment.as_ref()?;
+        let (wi, radiance, pdf) = environment.sample(receiver.hemisphere(), [u0, u1], [rest, u_digits])?;
+        let sky = Some(environment.place(wi));
+        Some(LightSample { wi, place: LightPlace::Far { radiance, sky }, pdf: share * pdf })
     }
 
     /// The solid-angle density of [`Self::sample`] for `receiver`, at a point of an emitting triangle that lies `distance` along the
@@ -228,12 +232,35 @@ impl Lights {
         }
     }
 
-    /// The environment's radiance from the unit direction `wi`, and the solid-angle density of [`Self::sample`] there.
-    pub fn environment(&self, wi: Vec3) -> Option<(Rgb, f32)> {
+    /// The environment's radiance from the unit direction `wi`, and where that is in it.
+    #[inline]
+    pub fn environment(&self, wi: Vec3) -> Option<(Rgb, SkyPlace)> {
         let environment = self.environment.as_ref()?;
+        let place = environment.place(wi);
+        Some((environment.radiance_at(place), place))
+    }
+
+    /// The solid-angle density of [`Self::sample`] for `receiver` at a place of the environment.
+    #[inline]
+    pub fn pdf_environment(&self, receiver: &Receiver, place: SkyPlace) -> f32 {
+        self.pdf_sky(receiver.hemisphere(), place)
+    }
+
+    #[inline]
+    fn pdf_sky(&self, normal: Option<Vec3>, place: SkyPlace) -> f32 {
         let share = self.selection.probability(self.far.len() + 1);
-        let (radiance, pdf) = environment.radiance_with_pdf(wi);
-        Some((radiance, if share > 0.0 { share * pdf } else { 0.0 }))
+        match &self.environment {
+            Some(environment) if share > 0.0 => share * environment.pdf(normal, place),
+            _ => 0.0,
+        }
+    }
+}
+
+impl Receiver {
+    /// The normal of the hemisphere whose light counts; none where light of all directions does.
+    #[inline]
+    fn hemisphere(&self) -> Option<Vec3> {
+        (self.sides == Sides::Front).then_some(self.normal)
     }
 }
 
@@ -426,6 +453,7 @@ mod tests {
         let lights = Lights::new(&[], &[], Some(black), (Vec3::ZERO, 1.0));
         assert!(lights.is_empty());
         assert!(lights.sample(&floor(Vec3::ZERO), [0.5; 4]).is_none());
-        assert_eq!(lights.environment(Vec3::Y), Some((Rgb::BLACK, 0.0)));
+        let (radiance, place) = lights.environment(Vec3::Y).expect("an environment");
+        assert_eq!((radiance, lights.pdf_environment(&floor(Vec3::ZERO), place)), (Rgb::BLACK, 0.0));
     }
 }

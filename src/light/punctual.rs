@@ -48,7 +48,7 @@ pub(super) fn sample(light: &Light, from: Vec3, probability: f32) -> Option<Ligh
     let color = light.color * light.intensity;
     let (position, range, falloff): (Vec3, Option<f32>, &dyn Fn(Vec3) -> f32) = match &light.kind {
         LightKind::Directional { direction } => {
-            let place = LightPlace::Far { radiance: color, is_delta: true };
+            let place = LightPlace::Far { radiance: color, sky: None };
             return Some(LightSample { wi: -*direction, place, pdf: probability });
         }
         LightKind::Point { position, range } => (*position, *range, &|_| 1.0),

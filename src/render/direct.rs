@@ -105,7 +105,7 @@ pub(super) fn pdf_emission(scene: &Prepared, sample: &LightSample) -> f32 {
     match sample.place {
         LightPlace::Surface { triangle, .. } => scene.lights.pdf_emission(triangle),
         LightPlace::Point { .. } => 0.0,
-        LightPlace::Far { .. } => scene.lights.pdf_emission_far(sample.pdf),
+        LightPlace::Far { sky, .. } => sky.map_or(0.0, |sky| scene.lights.pdf_emission_far(sky)),
     }
 }
 

@@ -21,7 +21,7 @@ use super::surface::{Shading, Surface};
 use crate::accel::Ray;
 use crate::color::Rgb;
 use crate::disney::{BsdfSample, Lobe};
-use crate::light::Emission;
+use crate::light::{Emission, SkyPlace};
 use crate::math::sobol::{Purpose, Sampler};
 use crate::math::{Frame, warp};
 
@@ -72,10 +72,8 @@ enum Start {
         triangle: u32,
         point: Vec3,
     },
-    /// With the density of choosing its direction at a surface, the same at all.
-    Far {
-        pdf: f32,
-    },
+    /// A place of the environment.
+    Far(SkyPlace),
 }
 
 /// Roulette begins at the first surface: most of what these paths are for happens there. In the Cornell boxes the error stays what it is with
@@ -152,8 +150,8 @@ fn start(scene: &Prepared, sampler: &Sampler) -> Option<Flight> {
             let ray = Ray { source: Some(triangle), ..Ray::new(origin, direction) };
             (ray, radiance, pdf, Start::Surface { triangle, point })
         }
-        Emission::Far { origin, wi, radiance, pdf, pdf_light } => {
-            (Ray::new(origin, -wi), radiance, pdf, Start::Far { pdf: pdf_light })
+        Emission::Far { origin, wi, radiance, pdf, sky } => {
+            (Ray::new(origin, -wi), radiance, pdf, Start::Far(sky))
         }
     };
     let beta = radiance / pdf;
@@ -217,13 +215,13 @@ impl Flight {
     /// of choosing the light.
     #[inline]
     fn others_with(&self, scene: &Prepared, surface: &Surface<'_>, wo: Vec3, pdf: f32) -> f32 {
+        let receiver = || surface.seen_from(wo).receiver();
         let pdf_light = match self.light {
             None => 0.0,
-            Some(Start::Far { pdf }) => pdf,
+            Some(Start::Far(sky)) => scene.lights.pdf_environment(&receiver(), sky),
             Some(Start::Surface { triangle, point }) => {
                 let distance = (surface.point - point).length();
-                let receiver = surface.seen_from(wo).receiver();
-                scene.lights.pdf_triangle(&receiver, triangle, surface.wo, distance)
+                scene.lights.pdf_triangle(&receiver(), triangle, surface.wo, distance)
             }
         };
         self.others * (pdf * pdf + pdf_light * pdf_light).sqrt()

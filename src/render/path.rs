@@ -216,10 +216,11 @@ impl Walk {
     /// Meets nothing but the environment.
     #[inline(always)]
     fn leave_scene(&mut self, scene: &Prepared) {
-        if let Some((radiance, pdf_light)) = scene.lights.environment(self.ray.direction) {
+        if let Some((radiance, sky)) = scene.lights.environment(self.ray.direction) {
             let passing = medium::transmittance(self.medium, f32::INFINITY);
-            let emission = || scene.lights.pdf_emission_far(pdf_light);
-            self.add_met(scene, radiance * passing, |_| pdf_light, emission);
+            let pdf_light = |from: &Receiver| scene.lights.pdf_environment(from, sky);
+            let emission = || scene.lights.pdf_emission_far(sky);
+            self.add_met(scene, radiance * passing, pdf_light, emission);
         }
     }
 
