@@ -52,8 +52,8 @@ const LEFT_TO_BSDF: f64 = 0.5;
 pub enum Partner {
     /// Nothing: the density is in proportion to the light.
     None,
-    /// BSDF sampling, with weights that sum to one: the density is in proportion to what the light exceeds its mean by, and 0 elsewhere
-    /// (Karlík et al. 2019, "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling").
+    /// BSDF sampling, with weights that sum to one: the density is in proportion to what the light exceeds its mean by, on surfaces half of its
+    /// mean, and 0 elsewhere (Karlík et al. 2019, "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling").
     Bsdf,
 }
 
@@ -69,7 +69,7 @@ impl EnvironmentTable {
             Equirectangular::Aris => ((image.width as usize - 1).max(1), (image.height as usize - 1).max(1)),
         };
         let polar_cosine = |row: usize| Real::cos(std::f64::consts::PI * row as f64 / row_count as f64);
-        let band = |row: usize| polar_cosine(row) - polar_cosine(row + 1);
+        let cosines: Vec<f64> = (0..=row_count).map(polar_cosine).collect();
         let cell_azimuth = std::f64::consts::TAU / columns as f64;
 
         let (luminances, sums): (Vec<Vec<f32>>, Vec<[f64; 3]>) = (0..row_count)
@@ -79,37 +79,16 @@ impl EnvironmentTable {
                 let channels: [fn(&Rgb) -> f32; 3] = [|c| c.r, |c| c.g, |c| c.b];
                 let sum = channels.map(|channel| {
                     cells.iter().map(|c| f64::from(channel(c).max(0.0))).sum::<f64>()
-                        * band(row)
+                        * (cosines[row] - cosines[row + 1])
                         * cell_azimuth
                 });
                 (cells.iter().map(|c| c.luminance()).collect(), sum)
             })
             .unzip();
         let total = [0, 1, 2].map(|channel| sums.iter().map(|row| row[channel]).sum::<f64>());
-        let row_cosines: Vec<f32> = (0..=row_count).map(|row| polar_cosine(row) as f32).collect();
         let region_columns = bounds(columns, REGION_COLUMNS);
         let region_rows = bounds(row_count, REGION_ROWS);
-        let power = |row: usize, cell: &f32| f64::from(cell.max(0.0)) * band(row) * cell_azimuth;
-        let in_region = (0..region_rows.len() - 1)
-            .into_par_iter()
-            .flat_map_iter(|row| (0..region_columns.len() - 1).map(move |column| (row, column)));
-        let (regions, in_region): (Vec<Region>, Vec<Grid>) = in_region
-            .map(|(row, column)| {
-                let rows = region_rows[row]..region_rows[row + 1];
-                let inside = region_columns[column]..region_columns[column + 1];
-                let cells: Vec<Vec<f64>> = rows
-                    .clone()
-                    .map(|row| luminances[row][inside.clone()].iter().map(|c| power(row, c)).collect())
-                    .collect();
-                let turn = |column: usize| (column as f64 / columns as f64) as f32;
-                let turns = [turn(inside.start), turn(inside.end)];
-                let cosines = [row_cosines[rows.start], row_cosines[rows.end]];
-                let solid_angle = rows.map(band).sum::<f64>() * cell_azimuth * inside.len() as f64;
-                let power = cells.iter().flatten().sum();
-                (Region::new(power, solid_angle, turns, cosines), Grid::new(&cells))
-            })
-            .unzip();
-        let regions = Regions { all: regions, columns: region_columns.len() - 1 };
+        let (regions, in_region) = Regions::of(&luminances, &cosines, &region_rows, &region_columns);
         let left = |part: f64| if partner == Partner::Bsdf { part } else { 0.0 };
         let weights = regions.weights(left(1.0), |_| 1.0);
         let (from_everywhere, sampled) = (regions.grid(&weights), weights.iter().sum::<f64>());
@@ -124,7 +103,7 @@ impl EnvironmentTable {
             .collect();
         Self {
             columns,
-            row_cosines,
+            row_cosines: cosines.into_iter().map(|cosine| cosine as f32).collect(),
             region_columns,
             region_rows,
             from_everywhere,
@@ -206,6 +185,28 @@ struct Regions {
 }
 
 impl Regions {
+    /// Those of cells of such luminances, in rows between such cosines, that begin at such rows and columns; and the choice of a cell in each.
+    fn of(luminances: &[Vec<f32>], cosines: &[f64], rows: &[usize], columns: &[usize]) -> (Self, Vec<Grid>) {
+        let count = luminances[0].len() as f64;
+        let (width, height) = (columns.len() - 1, rows.len() - 1);
+        let region = |at: usize| {
+            let rows = rows[at / width]..rows[at / width + 1];
+            let columns = columns[at % width]..columns[at % width + 1];
+            let cell = |row: usize| (cosines[row] - cosines[row + 1]) * std::f64::consts::TAU / count;
+            let powers = |row: usize| -> Vec<f64> {
+                luminances[row][columns.clone()].iter().map(|l| f64::from(l.max(0.0)) * cell(row)).collect()
+            };
+            let cells: Vec<Vec<f64>> = rows.clone().map(powers).collect();
+            let power = cells.iter().flatten().sum();
+            let turns = [columns.start, columns.end].map(|column| (column as f64 / count) as f32);
+            let ends = [rows.start, rows.end].map(|row| cosines[row] as f32);
+            let solid_angle = rows.map(cell).sum::<f64>() * columns.len() as f64;
+            (Region::new(power, solid_angle, turns, ends), Grid::new(&cells))
+        };
+        let (all, cells) = (0..width * height).into_par_iter().map(region).unzip();
+        (Self { all, columns: width }, cells)
+    }
+
     /// What each has of the luminance that exceeds `left` times the mean, where all counts by a cosine.
     fn weights(&self, left: f64, cosine: impl Fn(&Region) -> f64) -> Vec<f64> {
         let cosines: Vec<f64> = self.all.iter().map(cosine).collect();
