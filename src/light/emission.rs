@@ -78,8 +78,8 @@ impl Lights {
         let (index, _) = self.emitters.choice.sample(u_light)?;
         if index == self.emitters.environment {
             let environment = self.environment.as_ref()?;
-            let (wi, radiance, _) = environment.sample(None, [u0, u1], [u_side, u_side])?;
-            let sky = environment.place(wi);
+            let (wi, sky, _) = environment.sample(None, [u0, u1], [u_side, u_side])?;
+            let radiance = environment.radiance_at(sky);
             let [x, y] = warp::concentric_disk(u_disk);
             let frame = Frame::from_normal(wi);
             let across = frame.tangent * x + frame.bitangent * y;

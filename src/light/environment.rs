@@ -84,18 +84,23 @@ impl EnvironmentLight {
         self.radiance_at(self.place(wi))
     }
 
-    /// A direction with its radiance and its density per unit solid angle, for light that falls on a surface of unit `normal`, or on none:
+    /// A direction, where that is, and its density per unit solid angle, for light that falls on a surface of unit `normal`, or on none:
     /// from everywhere. `digits` continue those of `u`.
-    pub fn sample(&self, normal: Option<Vec3>, u: [f32; 2], digits: [f32; 2]) -> Option<(Vec3, Rgb, f32)> {
+    pub fn sample(
+        &self,
+        normal: Option<Vec3>,
+        u: [f32; 2],
+        digits: [f32; 2],
+    ) -> Option<(Vec3, SkyPlace, f32)> {
         match &self.map {
             Map::Constant => {
                 let wi: Vec3 = warp::uniform_sphere(u).into();
-                Some((wi, self.scale, 1.0 / (4.0 * PI)))
+                Some((wi, self.place(wi), 1.0 / (4.0 * PI)))
             }
             Map::Image(map) => {
                 let (azimuth, cos_theta, pdf) = map.table.sample(map.turned(normal), u, digits)?;
                 let wi = map.direction(azimuth, cos_theta).normalize();
-                Some((wi, self.radiance(wi), pdf))
+                Some((wi, self.place(wi), pdf))
             }
         }
     }

@@ -91,14 +91,14 @@ impl EnvironmentTable {
         let (regions, in_region) = Regions::of(&luminances, &cosines, &region_rows, &region_columns);
         let left = |part: f64| if partner == Partner::Bsdf { part } else { 0.0 };
         let weights = regions.weights(left(1.0), |_| 1.0);
-        let (from_everywhere, sampled) = (regions.grid(&weights), weights.iter().sum::<f64>());
+        let (from_everywhere, sampled) = (Grid::new(&weights, regions.columns), weights.iter().sum::<f64>());
         let share = if sampled > ROUNDING * luminance(total) { sampled / luminance(total) } else { 0.0 };
         let by_facing = (0..facing::COUNT)
             .into_par_iter()
             .map(|cell| {
                 let facing = Facing::new(cell);
                 let cosine = |r: &Region| f64::from(facing.mean_cosine(r.middle, &r.some, r.radius));
-                regions.grid(&regions.weights(left(LEFT_TO_BSDF), cosine))
+                Grid::new(&regions.weights(left(LEFT_TO_BSDF), cosine), regions.columns)
             })
             .collect();
         Self {
@@ -193,15 +193,15 @@ impl Regions {
             let rows = rows[at / width]..rows[at / width + 1];
             let columns = columns[at % width]..columns[at % width + 1];
             let cell = |row: usize| (cosines[row] - cosines[row + 1]) * std::f64::consts::TAU / count;
-            let powers = |row: usize| -> Vec<f64> {
-                luminances[row][columns.clone()].iter().map(|l| f64::from(l.max(0.0)) * cell(row)).collect()
+            let power_in = |row: usize| {
+                luminances[row][columns.clone()].iter().map(move |l| f64::from(l.max(0.0)) * cell(row))
             };
-            let cells: Vec<Vec<f64>> = rows.clone().map(powers).collect();
-            let power = cells.iter().flatten().sum();
+            let cells: Vec<f64> = rows.clone().flat_map(power_in).collect();
+            let power = cells.iter().sum();
             let turns = [columns.start, columns.end].map(|column| (column as f64 / count) as f32);
             let ends = [rows.start, rows.end].map(|row| cosines[row] as f32);
             let solid_angle = rows.map(cell).sum::<f64>() * columns.len() as f64;
-            (Region::new(power, solid_angle, turns, ends), Grid::new(&cells))
+            (Region::new(power, solid_angle, turns, ends), Grid::new(&cells, columns.len()))
         };
         let (all, cells) = (0..width * height).into_par_iter().map(region).unzip();
         (Self { all, columns: width }, cells)
@@ -217,14 +217,9 @@ impl Regions {
         let excess = |region: &Region| (region.power - left * region.solid_angle).max(0.0);
         self.all.iter().zip(&cosines).map(|(region, cosine)| excess(region) * cosine).collect()
     }
-
-    /// The choice by as many weights.
-    fn grid(&self, weights: &[f64]) -> Grid {
-        Grid::new(&weights.chunks(self.columns).map(<[f64]>::to_vec).collect::<Vec<_>>())
-    }
 }
 
-/// What regions are chosen by.
+/// What a region is chosen by.
 struct Region {
     /// ∫ luminance dω.
     power: f64,

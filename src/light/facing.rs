@@ -17,14 +17,10 @@ const LEAST_COSINE: f32 = 0.02;
 #[inline]
 pub(super) fn cell_of(normal: Vec3) -> Option<usize> {
     let n = normal / normal.abs().element_sum();
-    let folded = if n.z >= 0.0 {
-        Vec2::new(n.x, n.y)
-    } else {
-        Vec2::new((1.0 - n.y.abs()).copysign(n.x), (1.0 - n.x.abs()).copysign(n.y))
-    };
-    let place = (folded * 0.5 + 0.5) * SIDE as f32;
+    let flat = folded(n.truncate(), n.z);
+    let place = (flat * 0.5 + 0.5) * SIDE as f32;
     let index = |v: f32| (v as usize).min(SIDE - 1);
-    folded.is_finite().then(|| index(place.y) * SIDE + index(place.x))
+    flat.is_finite().then(|| index(place.y) * SIDE + index(place.x))
 }
 
 /// The normals of a cell.
@@ -70,12 +66,13 @@ pub(super) fn angle(a: Vec3, b: Vec3) -> f32 {
 /// The unit direction at a place of the map in [-1, 1]².
 fn unfolded(p: Vec2) -> Vec3 {
     let z = 1.0 - p.x.abs() - p.y.abs();
-    let xy = if z >= 0.0 {
-        p
-    } else {
-        Vec2::new((1.0 - p.y.abs()).copysign(p.x), (1.0 - p.x.abs()).copysign(p.y))
-    };
-    Vec3::new(xy.x, xy.y, z).normalize()
+    folded(p, z).extend(z).normalize()
+}
+
+/// The lower half of the octahedron turned over its edges, to the outside or back.
+#[inline]
+fn folded(p: Vec2, z: f32) -> Vec2 {
+    if z >= 0.0 { p } else { Vec2::new((1.0 - p.y.abs()).copysign(p.x), (1.0 - p.x.abs()).copysign(p.y)) }
 }
 
 #[cfg(test)]

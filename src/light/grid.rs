@@ -20,13 +20,11 @@ pub(super) struct Cell {
 }
 
 impl Grid {
-    /// Of the cells' weights, row by row.
-    pub(super) fn new(rows: &[Vec<f64>]) -> Self {
-        let sums: Vec<f64> = rows.iter().map(|row| row.iter().filter(|w| **w > 0.0).sum()).collect();
-        Self {
-            rows: Distribution::new(&sums),
-            in_row: rows.iter().map(|row| Distribution::new(row)).collect(),
-        }
+    /// Of the cells' weights, none below 0, in rows of so many columns.
+    pub(super) fn new(weights: &[f64], columns: usize) -> Self {
+        let sums: Vec<f64> = weights.chunks(columns).map(|row| row.iter().sum()).collect();
+        let in_row = weights.chunks(columns).map(Distribution::new).collect();
+        Self { rows: Distribution::new(&sums), in_row }
     }
 
     /// The first number chooses the column, the second the row. `digits` continue theirs, which rarely chosen cells leave few of.

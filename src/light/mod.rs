@@ -195,7 +195,8 @@ impl Lights {
     }
 
     /// A light as seen from `receiver`; none if the chosen one can't shine there. The first two numbers say where on it, the third
-    /// which, and the fourth continues the third's digits: 24 bits are too few to tell 100,000 lights apart.
+    /// which, and the fourth continues the third's digits: 24 bits are too few to tell 100,000 lights apart. In the environment these
+    /// two continue those of the first.
     #[inline]
     pub fn sample(&self, receiver: &Receiver, [u0, u1, u_light, u_digits]: [f32; 4]) -> Option<LightSample> {
         let (group, share, rest) = self.selection.sample_with_rest(u_light)?;
@@ -208,9 +209,9 @@ impl Lights {
             return punctual::sample(light, receiver.point, share);
         }
         let environment = self.environment.as_ref()?;
-        let (wi, radiance, pdf) = environment.sample(receiver.hemisphere(), [u0, u1], [rest, u_digits])?;
-        let sky = Some(environment.place(wi));
-        Some(LightSample { wi, place: LightPlace::Far { radiance, sky }, pdf: share * pdf })
+        let (wi, sky, pdf) = environment.sample(receiver.hemisphere(), [u0, u1], [rest, u_digits])?;
+        let place = LightPlace::Far { radiance: environment.radiance_at(sky), sky: Some(sky) };
+        Some(LightSample { wi, place, pdf: share * pdf })
     }
 
     /// The solid-angle density of [`Self::sample`] for `receiver`, at a point of an emitting triangle that lies `distance` along the
