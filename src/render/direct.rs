@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use super::Prepared;
 use super::from_light::{FromLight, with_light};
 use super::medium::{self, Medium};
+use super::mis::{Heuristic, Rivals};
 use super::offset::offset;
 use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
@@ -25,12 +26,12 @@ pub(super) struct Reflected {
     pub(super) radiance: Rgb,
     /// The density of the light's point, which the radiance has still to be divided by: together with its weight, as it may be tiny.
     pub(super) pdf: f32,
-    /// How many times as densely the light's point is found by BSDF sampling, and by light paths; none for lights without extent.
-    pub(super) others: Option<[f32; 2]>,
+    /// How else the light's point is found; none for lights without extent.
+    pub(super) rivals: Option<Rivals>,
 }
 
 impl Reflected {
-    const NOTHING: Self = Self { radiance: Rgb::BLACK, pdf: 1.0, others: None };
+    const NOTHING: Self = Self { radiance: Rgb::BLACK, pdf: 1.0, rivals: None };
 }
 
 impl Arriving {
@@ -92,11 +93,25 @@ pub(super) fn direct_light(
     if is_left_out(passing.is_black()) {
         return Reflected::NOTHING;
     }
-    let others = (!sample.is_delta()).then(|| {
+    let rivals = (!sample.is_delta()).then(|| {
         let towards = from_light.towards(scene, surface, shading, sample.wi);
-        [pdf_bsdf, with_light(towards, || pdf_emission(scene, sample))].map(|pdf| pdf / sample.pdf)
+        let pdf_light_paths = with_light(towards, || pdf_emission(scene, sample));
+        Rivals {
+            camera: pdf_bsdf / sample.pdf,
+            light_paths: pdf_light_paths / sample.pdf,
+            heuristic: heuristic(sample),
+        }
     });
-    Reflected { radiance: f * arriving.radiance * passing, pdf: sample.pdf, others }
+    Reflected { radiance: f * arriving.radiance * passing, pdf: sample.pdf, rivals }
+}
+
+/// How BSDF sampling shares the light.
+#[inline]
+pub(super) fn heuristic(sample: &LightSample) -> Heuristic {
+    match sample.place {
+        LightPlace::Far { sky: Some(_), .. } => Heuristic::Balance,
+        _ => Heuristic::Power,
+    }
 }
 
 /// The density with which paths start from the light where `sample` is, which has an extent.

@@ -15,8 +15,9 @@ use super::camera::Sight;
 use super::direct::transmittance;
 use super::from_light::mirrors_back;
 use super::medium::{self, Medium};
+use super::mis::power;
 use super::offset::{offset, ray_to};
-use super::path::{next_surface, power_heuristic};
+use super::path::next_surface;
 use super::surface::{Shading, Surface};
 use crate::accel::Ray;
 use crate::color::Rgb;
@@ -198,7 +199,7 @@ impl Flight {
             cosines * scene.camera.pixels_per_steradian(sight.direction) / (sight.distance * sight.distance);
         let per_sample = scene.light_paths.as_ref().ok()?.per_sample as f32;
         let others = self.others_with(scene, surface, wo, pdf) * density * scene.camera_weight() / per_sample;
-        let radiance = self.beta * f * (density * power_heuristic(1.0, [others, 0.0]));
+        let radiance = self.beta * f * (density * power(others));
         // What the camera finds beyond all bounds more densely is left to it: its weight here is nothing, of what may be no number.
         if radiance.is_black() || !others.is_finite() {
             return None;

@@ -14,6 +14,7 @@ mod light_path;
 mod mapped_normal;
 mod material;
 mod medium;
+mod mis;
 mod offset;
 mod path;
 mod pilot;

@@ -8,6 +8,7 @@ use super::Prepared;
 use super::direct::direct_light;
 use super::from_light::FromLight;
 use super::medium::{self, Medium};
+use super::mis::{Heuristic, Rivals, Strategies};
 use super::replay::ReplayVertex;
 use super::reuse::{Direct, Later, Met, Onward, Trail};
 use super::surface::{Shading, Surface};
@@ -50,50 +51,6 @@ const SPARED: f32 = 0.5;
 const MAX_SURVIVAL: f32 = 0.95;
 /// A path that others may have joined counts as one that carried at least this to there: they may carry more.
 const LEAST_BEFORE: f32 = 0.05;
-
-/// The power heuristic (Veach 1997) with exponent 2, safe from overflow: the weight of a sample by its density and those of the others.
-#[inline]
-pub(super) fn power_heuristic(pdf: f32, others: [f32; 2]) -> f32 {
-    if !pdf.is_finite() {
-        return 1.0;
-    }
-    let [a, b] = others.map(|other| other / pdf);
-    1.0 / (1.0 + a * a + b * b)
-}
-
-/// Which of the ways to find a light count. All combinations have the same expectation.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Strategies {
-    pub(super) nee: bool,
-    pub(super) mis: bool,
-}
-
-impl Strategies {
-    #[inline]
-    pub(super) fn of(scene: &Prepared) -> Self {
-        Self { nee: scene.settings.nee, mis: scene.settings.mis }
-    }
-
-    /// What a path counts that met a light: `others` is how many times as densely light sampling finds it, 0 if it can't, and light paths.
-    #[inline]
-    pub(super) fn w_bsdf(self, others: [f32; 2]) -> f32 {
-        match self {
-            Self { nee: true, mis: true } => power_heuristic(1.0, others),
-            Self { nee: true, mis: false } if others[0] > 0.0 => 0.0,
-            _ => 1.0,
-        }
-    }
-
-    /// What a light sample counts: `others` is how many times as densely BSDF sampling finds it, and light paths; none where nothing else does.
-    #[inline]
-    pub(super) fn w_light(self, others: Option<[f32; 2]>) -> f32 {
-        match (self, others) {
-            (_, None) | (Self { nee: true, mis: false }, _) => 1.0,
-            (Self { nee: true, mis: true }, Some(others)) => power_heuristic(1.0, others),
-            (Self { nee: false, .. }, Some(_)) => 0.0,
-        }
-    }
-}
 
 /// Traces one path. `inspect` is called at each vertex with the radiance gathered so far.
 #[inline]
@@ -220,17 +177,18 @@ impl Walk {
             let passing = medium::transmittance(self.medium, f32::INFINITY);
             let pdf_light = |from: &Receiver| scene.lights.pdf_environment(from, sky);
             let emission = || scene.lights.pdf_emission_far(sky);
-            self.add_met(scene, radiance * passing, pdf_light, emission);
+            self.add_met(scene, radiance * passing, Heuristic::Balance, pdf_light, emission);
         }
     }
 
-    /// Adds the radiance of a light that the path met. `pdf_light` is the density of sampling it where the path last scattered, `emission`
-    /// that of its own paths' start.
+    /// Adds the radiance of a light that the path met, which light sampling shares by such a heuristic. `pdf_light` is the density of
+    /// sampling it where the path last scattered, `emission` that of its own paths' start.
     #[inline(always)]
     fn add_met(
         &mut self,
         scene: &Prepared,
         radiance: Rgb,
+        heuristic: Heuristic,
         pdf_light: impl FnOnce(&Receiver) -> f32,
         emission: impl FnOnce() -> f32,
     ) {
@@ -239,26 +197,26 @@ impl Walk {
         if self.vertices == 3
             && let Some(onward) = &mut self.trail.onward
         {
-            (onward.met, onward.pdf_light) = (radiance, last.map_or(0.0, |(_, pdf_light)| pdf_light));
+            (onward.met, onward.heuristic) = (radiance, heuristic);
+            onward.pdf_light = last.map_or(0.0, |(_, pdf_light)| pdf_light);
             onward.emission = if scene.light_paths.is_ok() { emission() } else { 0.0 };
             return;
         }
-        let by_light = last.map_or(0.0, |(pdf, pdf_light)| pdf_light / pdf);
-        let from_light = self.from_light.at_light(emission);
-        self.add(radiance, 1.0, [by_light, from_light], |others| Strategies::of(scene).w_bsdf(others));
+        let camera = last.map_or(0.0, |(pdf, pdf_light)| pdf_light / pdf);
+        let rivals = Rivals { camera, light_paths: self.from_light.at_light(emission), heuristic };
+        self.add(radiance, 1.0, rivals, |rivals| Strategies::of(scene).w_bsdf(rivals));
     }
 
-    /// Adds radiance that was found with the density `pdf` and counts a `weight` against the `others`: if it depends on light paths and the
+    /// Adds radiance that was found with the density `pdf` and counts a `weight` against its rivals: if it depends on light paths and the
     /// path was divided, each that joined it there has its own.
     #[inline(always)]
-    fn add(&mut self, radiance: Rgb, pdf: f32, others: [f32; 2], weight: impl Fn([f32; 2]) -> f32) {
-        let [other, from_light] = others;
-        if from_light > 0.0 && self.before.is_some() {
-            let of_camera = weight([other, 0.0]);
-            let from_light = from_light * of_camera.sqrt();
-            self.trail.later.push(Later { radiance: radiance * (of_camera / pdf), from_light });
+    fn add(&mut self, radiance: Rgb, pdf: f32, rivals: Rivals, weight: impl Fn(Rivals) -> f32) {
+        if rivals.light_paths > 0.0 && self.before.is_some() {
+            let in_camera = weight(Rivals { light_paths: 0.0, ..rivals });
+            let light_paths = rivals.light_paths_to_camera();
+            self.trail.later.push(Later { radiance: radiance * (in_camera / pdf), light_paths });
         } else {
-            self.path.radiance += radiance * (weight(others) / pdf);
+            self.path.radiance += radiance * (weight(rivals) / pdf);
         }
     }
 
@@ -315,9 +273,9 @@ impl Walk {
             if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
                 let (way, rays) = (self.from_light, &mut self.path.rays);
                 let direct = direct_light(scene, &surface, &shading, &sample, way, self.medium, rays);
-                let weight = |others| Strategies::of(scene).w_light(direct.others.map(|_| others));
-                let others = direct.others.unwrap_or_default();
-                self.add(self.beta * direct.radiance, direct.pdf, others, weight);
+                let weight = |rivals| Strategies::of(scene).w_light(direct.rivals.map(|_| rivals));
+                let rivals = direct.rivals.unwrap_or_default();
+                self.add(self.beta * direct.radiance, direct.pdf, rivals, weight);
             }
         }
         let flow = self.send_on(scene, &surface, &shading, sampler.set(self.vertices, Purpose::Bsdf));
@@ -370,7 +328,8 @@ impl Walk {
             let pdf_light = |from: &Receiver| {
                 scene.lights.pdf_triangle(from, triangle, wi, (surface.point - from.point).length())
             };
-            self.add_met(scene, emitted, pdf_light, || scene.lights.pdf_emission(triangle));
+            let emission = || scene.lights.pdf_emission(triangle);
+            self.add_met(scene, emitted, Heuristic::Power, pdf_light, emission);
         }
         if self.last_scatter.is_none() {
             self.path.radiance += self.beta * surface.unlit(scene);
@@ -462,20 +421,5 @@ pub(super) fn first_hit(
         albedo: shading.map_or(Rgb::BLACK, |s| s.bsdf.albedo()),
         normal: shading.map_or(Vec3::ZERO, |s| if s.wo.z < 0.0 { -s.frame.normal } else { s.frame.normal }),
         depth: (surface.point - ray.origin).dot(scene.camera.axis),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn weights_of_two_strategies_sum_to_one() {
-        for (a, b) in [(1.0, 2.0), (1e30, 1e-30), (1e-38, 1e38), (5.0, 0.0)] {
-            let sum = power_heuristic(a, [b, 0.0]) + power_heuristic(b, [0.0, a]);
-            // A strategy that can't make the sample has no say.
-            assert!((sum - 1.0).abs() < 1e-6 || b == 0.0, "{a} {b}: {sum}");
-            assert!(power_heuristic(a, [b, 0.0]).is_finite());
-        }
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! What they save is the noise of light that the camera's paths find too rarely to be measured by a few of these. But light paths meet it, and
 //! know how rarely the others do: where a light path's contribution c to a pixel has the weight 1/(1 + o²) against camera paths that
-//! are o times as dense, these alone have the second moment c²(1 + o²)²/o there, and both together c²(1 + o³). The difference is counted
-//! where light paths are the denser ones: elsewhere it is mostly light that is found well, and evenly spread points make less noise of
-//! it than of independent ones, which is what moments tell. Errors are relative to what is seen, as everywhere
+//! are o times as dense, these alone have the second moment c²(1 + o²)²/o there; with light paths they have c²o³, and these c². That
+//! counts where a camera path would find many times what is seen there. Elsewhere evenly spread points leave hardly any noise of
+//! what moments tell: in the open under a sky light paths pay for nothing. Errors are relative to what is seen, as everywhere
 //! ([`crate::math::stats::relative_square`]); costs are counted in rays, so that the answer depends on the scene and the settings
 //! alone.
 
@@ -33,6 +33,12 @@ const CELLS: u32 = 12;
 const COST: f64 = 1.6;
 /// Light that camera paths find more rarely than this, relative to light paths, counts as if it were found so often.
 const RAREST: f64 = 1e-6;
+/// Light that a camera path finds as so many times what is seen there, it finds rarely. In scenes where light paths pay it is mostly 32 times
+/// and more, where they don't it is less than 16.
+const RARE: f64 = 16.0;
+/// What is left of the noise of light paths by spreading them evenly, where camera paths do not find their light rarely. Measured: 0 in closed
+/// rooms to 0.3 and 0.5 in the open.
+const SPREAD_OF_LIGHTS: f64 = 0.15;
 
 /// What joining a neighbour's path costs, in rays as well: the shadow ray, and what the two surfaces reflect. Measured: 1 to 1.3.
 const JOINING_COST: f64 = 1.2;
@@ -61,13 +67,13 @@ pub(super) struct Choice {
 
 /// What each technique is worth, per sample of a pixel.
 struct Worth {
-    /// The error of what camera paths find, and that of light paths.
-    of_camera: f64,
+    /// The error of what camera paths find of their own, and of what neighbours can use.
+    own: f64,
+    shared: f64,
+    /// That of light paths.
     of_lights: f64,
-    /// More error of camera paths without light paths.
+    /// More error of camera paths without light paths, before neighbours share it.
     saved: f64,
-    /// The part of the camera paths' error that is left where neighbours use them too.
-    left: f64,
     /// Rays of light paths and of joining, for each ray of camera paths.
     light_cost: f64,
     joining_cost: f64,
@@ -83,12 +89,13 @@ struct Used {
 impl Worth {
     /// Error and cost, relative to nothing in particular.
     fn of(&self, used: Used) -> (f64, f64) {
-        let left = if used.path_reuse { self.left } else { 1.0 };
-        let (lights, saved) =
-            if used.light_paths { (self.of_lights, 0.0) } else { (0.0, self.of_lights + self.saved) };
+        let shared = if used.path_reuse { self.shared / BLOCK as f64 } else { self.shared };
+        let of_camera = self.own * SPREAD + shared;
+        let left = if of_camera > 0.0 { of_camera / (self.own * SPREAD + self.shared) } else { 1.0 };
+        let of_light = if used.light_paths { self.of_lights } else { self.saved * left };
         let light_cost = if used.light_paths { self.light_cost } else { 0.0 };
         let joining_cost = if used.path_reuse { self.joining_cost } else { 0.0 };
-        ((self.of_camera + saved) * left + lights, 1.0 + light_cost + joining_cost)
+        (of_camera + of_light, 1.0 + light_cost + joining_cost)
     }
 
     fn work(&self, used: Used) -> f64 {
@@ -166,15 +173,18 @@ fn measure(scene: &Prepared, can_reuse: bool) -> Worth {
     };
     let of_camera = sum(|look| look.variance);
     let own = sum(|look| look.own_variance).min(of_camera);
-    let shared = of_camera - own;
     let (mut of_lights, mut saved) = (0.0, 0.0);
     for seen in flights.iter().flat_map(|(seen, _)| seen) {
-        let squares = channels(seen.radiance).map(|c| c * c);
-        let moment = error(squares, means[cell(scene, seen.film)]);
-        let others = f64::from(seen.others);
-        of_lights += moment;
-        if others < 1.0 {
-            saved += moment * (1.0 / others.max(RAREST) + 2.0 * others - 1.0);
+        let mean = means[cell(scene, seen.film)];
+        let moment = error(channels(seen.radiance).map(|c| c * c), mean);
+        let others = f64::from(seen.others).max(RAREST);
+        let both_ways = (1.0 + others * others) / others;
+        let found_by_camera = sum_of(channels(seen.radiance)) * both_ways / f64::from(per_sample);
+        if found_by_camera < RARE * sum_of(mean) {
+            of_lights += moment * SPREAD_OF_LIGHTS;
+        } else {
+            of_lights += moment;
+            saved += moment * (1.0 / others + 2.0 * others);
         }
     }
     let scale = 1.0 / (f64::from(paths.max(1)) * f64::from(per_sample.max(1)) * pixels as f64);
@@ -182,14 +192,10 @@ fn measure(scene: &Prepared, can_reuse: bool) -> Worth {
     let light_rays = flights.iter().map(|(_, rays)| rays).sum::<u64>() as f64;
     let joining_rays = looks.iter().map(|look| look.shared).sum::<u64>() as f64 * (BLOCK - 1) as f64;
     Worth {
-        of_camera,
+        own,
+        shared: of_camera - own,
         of_lights: of_lights * scale,
         saved: saved * scale,
-        left: if of_camera > 0.0 {
-            (own * SPREAD + shared / BLOCK as f64) / (own * SPREAD + shared)
-        } else {
-            1.0
-        },
         light_cost: COST * light_rays / camera_rays,
         joining_cost: JOINING_COST * joining_rays / camera_rays,
     }
@@ -256,6 +262,10 @@ fn channels(radiance: Rgb) -> [f64; 3] {
 
 fn add(sum: &mut [f64; 3], value: [f64; 3]) {
     sum.iter_mut().zip(value).for_each(|(s, v)| *s += v);
+}
+
+fn sum_of(radiance: [f64; 3]) -> f64 {
+    radiance.into_iter().sum()
 }
 
 /// The mean over the channels of squares relative to what is seen.

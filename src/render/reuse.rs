@@ -22,9 +22,10 @@ use glam::Vec3;
 use smallvec::SmallVec;
 
 use super::Prepared;
-use super::direct::{Arriving, pdf_emission, transmittance};
+use super::direct::{Arriving, heuristic, pdf_emission, transmittance};
 use super::from_light::{FromLight, with_light};
-use super::path::{PathSample, Strategies, Walk, power_heuristic};
+use super::mis::{Heuristic, Rivals, Strategies, power};
+use super::path::{PathSample, Walk};
 use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
@@ -63,7 +64,8 @@ pub(super) struct Direct {
     reflected: (Rgb, f32),
     /// The density of its own paths' start; 0 without light paths, and for lights without extent.
     emission: f32,
-    is_delta: bool,
+    /// How BSDF sampling shares it; none of lights without extent.
+    heuristic: Option<Heuristic>,
 }
 
 /// The way on from a second surface.
@@ -72,8 +74,10 @@ pub(super) struct Onward {
     wi: Vec3,
     /// As the light's.
     reflected: (Rgb, f32),
-    /// The radiance of the light that it met first, the density of sampling that at the surface, and that of its own paths' start.
+    /// The radiance of the light that it met first, how light sampling shares that, the density of sampling it at the surface, and that of
+    /// its own paths' start.
     pub(super) met: Rgb,
+    pub(super) heuristic: Heuristic,
     pub(super) pdf_light: f32,
     pub(super) emission: f32,
 }
@@ -81,10 +85,10 @@ pub(super) struct Onward {
 /// Light that was found farther on, and is weighed against light paths for each that joined.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Later {
-    /// With its weight w against the other way that camera paths find it.
+    /// With its weight against the other way that camera paths find it.
     pub(super) radiance: Rgb,
-    /// How many times as densely light paths find it, but for what is before the way on, times √w.
-    pub(super) from_light: f32,
+    /// How many times as densely as both together light paths find it, but for what is before the way on.
+    pub(super) light_paths: f32,
 }
 
 /// What others may use of a path.
@@ -139,17 +143,19 @@ impl Direct {
         }
         *rays += 1;
         let radiance = arriving.radiance * arriving.passing(scene, surface.medium_towards(sample.wi, None));
-        let is_delta = sample.is_delta();
-        let emission = if is_delta || scene.light_paths.is_err() { 0.0 } else { pdf_emission(scene, sample) };
+        let heuristic = (!sample.is_delta()).then(|| heuristic(sample));
+        let is_found = heuristic.is_some() && scene.light_paths.is_ok();
+        let emission = if is_found { pdf_emission(scene, sample) } else { 0.0 };
         let (wi, pdf) = (sample.wi, sample.pdf);
-        (!radiance.is_black()).then_some(Self { wi, radiance, pdf, reflected, emission, is_delta })
+        (!radiance.is_black()).then_some(Self { wi, radiance, pdf, reflected, emission, heuristic })
     }
 }
 
 impl Onward {
     /// For a direction that was sampled with the density `pdf`, and `weight` = f·|cos θ|/pdf.
     pub(super) fn new(wi: Vec3, weight: Rgb, pdf: f32) -> Self {
-        Self { wi, reflected: (weight * pdf, pdf), met: Rgb::BLACK, pdf_light: 0.0, emission: 0.0 }
+        let (met, heuristic) = (Rgb::BLACK, Heuristic::default());
+        Self { wi, reflected: (weight * pdf, pdf), met, heuristic, pdf_light: 0.0, emission: 0.0 }
     }
 }
 
@@ -258,9 +264,11 @@ fn join(
         let seen = seen(direct.wi, direct.reflected);
         let density: f32 = seen.iter().flatten().map(|seen| seen.view.density).sum();
         for Seen { view, f, pdf, towards } in seen.into_iter().flatten() {
-            let others = [pdf, with_light(towards, || direct.emission)].map(|pdf| pdf / direct.pdf);
-            let others = (!direct.is_delta).then_some(others);
-            let scale = strategies.w_light(others) / (density * direct.pdf);
+            let rivals = direct.heuristic.map(|heuristic| {
+                let light_paths = with_light(towards, || direct.emission) / direct.pdf;
+                Rivals { camera: pdf / direct.pdf, light_paths, heuristic }
+            });
+            let scale = strategies.w_light(rivals) / (density * direct.pdf);
             samples[view.pixel].radiance += view.f * f * direct.radiance * scale;
         }
     }
@@ -269,11 +277,11 @@ fn join(
         let density: f32 = seen.iter().flatten().map(|seen| seen.view.density * seen.pdf).sum();
         for Seen { view, f, pdf, towards } in seen.into_iter().flatten().filter(|seen| seen.pdf > 0.0) {
             let way = towards / pdf;
-            let others = [onward.pdf_light / pdf, with_light(way, || onward.emission)];
-            let mut radiance = walk.beyond() + onward.met * strategies.w_bsdf(others);
+            let (camera, heuristic) = (onward.pdf_light / pdf, onward.heuristic);
+            let rivals = Rivals { camera, light_paths: with_light(way, || onward.emission), heuristic };
+            let mut radiance = walk.beyond() + onward.met * strategies.w_bsdf(rivals);
             for later in &trail.later {
-                let from_light = with_light(way, || later.from_light);
-                radiance += later.radiance * power_heuristic(1.0, [from_light, 0.0]);
+                radiance += later.radiance * power(with_light(way, || later.light_paths));
             }
             samples[view.pixel].radiance += view.f * f * radiance / density;
         }
