@@ -10,7 +10,7 @@ use crate::color::Rgb;
 use crate::math::{Real, warp};
 use crate::scene::Image;
 use crate::scene::environment::{Environment, EnvironmentMap, Equirectangular};
-use crate::scene::texture::{Encoding, Wrap};
+use crate::scene::texture::{Encoding, Wrap, floor};
 
 /// The environment, ready to be looked up and sampled.
 #[derive(Debug)]
@@ -138,13 +138,11 @@ impl ImageMap {
             Equirectangular::YUp => (uv.x * w as f32 - 0.5, uv.y * h as f32 - 0.5, Wrap::Repeat),
             Equirectangular::Aris => (uv.x * (w - 1) as f32, uv.y * (h - 1) as f32, Wrap::Clamp),
         };
-        let (x0, y0) = (x.floor(), y.floor());
-        let (tx, ty) = (x - x0, y - y0);
-        let fetch = |dx: i64, dy: i64| {
-            let x = wrap.pixel(x0 as i64 + dx, w);
-            self.image.texel(x, Wrap::Clamp.pixel(y0 as i64 + dy, h), Encoding::Linear).color
-        };
-        fetch(0, 0).lerp(fetch(1, 0), tx).lerp(fetch(0, 1).lerp(fetch(1, 1), tx), ty)
+        let ((x, tx), (y, ty)) = (floor(x), floor(y));
+        let (x0, x1) = (wrap.pixel(x, w), wrap.pixel(x + 1, w));
+        let (y0, y1) = (Wrap::Clamp.pixel(y, h), Wrap::Clamp.pixel(y + 1, h));
+        let fetch = |x: u32, y: u32| self.image.texel(x, y, Encoding::Linear).color;
+        fetch(x0, y0).lerp(fetch(x1, y0), tx).lerp(fetch(x0, y1).lerp(fetch(x1, y1), tx), ty)
     }
 
     /// Where in [0, 1]² a direction is: u by azimuth, v by the polar angle from the top.

@@ -94,10 +94,21 @@ struct Before {
 
 impl Walk {
     pub(super) fn new(scene: &Prepared, camera_ray: Ray) -> Self {
+        Self::with(scene, camera_ray, Trail::unkept())
+    }
+
+    /// A path that others of its block may use.
+    #[inline(always)]
+    pub(super) fn shared(scene: &Prepared, camera_ray: Ray) -> Self {
+        Self::with(scene, camera_ray, Trail::kept())
+    }
+
+    #[inline(always)]
+    fn with(scene: &Prepared, camera_ray: Ray, trail: Trail) -> Self {
         Self {
             path: PathSample::default(),
             before: None,
-            trail: Trail::unkept(),
+            trail,
             camera_ray,
             ray: camera_ray,
             vertices: 0,
@@ -108,11 +119,6 @@ impl Walk {
             medium: scene.camera_medium,
             from_light: FromLight::CAMERA,
         }
-    }
-
-    /// A path that others of its block may use.
-    pub(super) fn shared(scene: &Prepared, camera_ray: Ray) -> Self {
-        Self { trail: Trail::kept(), ..Self::new(scene, camera_ray) }
     }
 
     /// Goes on, from the surface `met` if it stopped there, until the path ends or meets one where it `stops`, which has not scattered it yet:

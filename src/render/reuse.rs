@@ -107,11 +107,13 @@ pub(super) struct Trail {
 
 impl Trail {
     /// For a path that is its own.
+    #[inline(always)]
     pub(super) fn unkept() -> Self {
         Self::default()
     }
 
     /// For a path of a block.
+    #[inline(always)]
     pub(super) fn kept() -> Self {
         Self { is_kept: true, ..Self::default() }
     }
@@ -207,6 +209,9 @@ impl Walk {
 pub(super) fn gather(scene: &Prepared, block: &[Walk]) -> [PathSample; BLOCK] {
     let mut samples: [PathSample; BLOCK] =
         std::array::from_fn(|i| block.get(i).map(Walk::path).unwrap_or_default());
+    if !block.iter().any(Walk::is_lit_beyond) {
+        return samples;
+    }
     let firsts: [Option<Surface<'_>>; BLOCK] = std::array::from_fn(|i| {
         let met = block.get(i)?.trail.first.as_ref()?;
         Some(Surface::new(scene, &met.ray, &met.hit))

@@ -14,7 +14,7 @@ use super::light_image;
 use super::path::{PathSample, Walk};
 use super::reuse::{self, gather};
 use super::tile;
-use crate::accel::Hit;
+use crate::accel::{Hit, Ray};
 use crate::math::sobol::Sampler;
 use crate::settings::Integrator;
 
@@ -150,17 +150,17 @@ impl<'a> Variants<'a> {
     ) {
         let first = self.scenes[going[0]];
         let are_several = going.len() > 1;
-        let mut walks = SmallVec::<[Walk; reuse::BLOCK]>::new();
-        let mut stops = SmallVec::<[(Sampler, Option<Hit>); reuse::BLOCK]>::new();
-        for &(x, y) in block {
-            let (sampler, ray) = camera_sample(first, x, y, sample);
-            walks.push(Walk::shared(first, ray));
-            let last = walks.len() - 1;
-            let stopped = |hit: &Hit| are_several && self.differs(hit);
-            let met = walks[last].go_on(first, &sampler, None, stopped, |_| ());
-            stops.push((sampler, met));
-        }
-        if stops.iter().all(|(_, met)| met.is_none()) {
+        let starts: SmallVec<[(Sampler, Ray); reuse::BLOCK]> =
+            block.iter().map(|&(x, y)| camera_sample(first, x, y, sample)).collect();
+        let mut walks: SmallVec<[Walk; reuse::BLOCK]> =
+            starts.iter().map(|&(_, ray)| Walk::shared(first, ray)).collect();
+        let stops = |hit: &Hit| are_several && self.differs(hit);
+        let stopped: SmallVec<[Option<Hit>; reuse::BLOCK]> = walks
+            .iter_mut()
+            .zip(&starts)
+            .map(|(walk, (sampler, _))| walk.go_on(first, sampler, None, stops, |_| ()))
+            .collect();
+        if stopped.iter().all(Option::is_none) {
             let samples = gather(first, &walks);
             for &variant in going {
                 for (pixel, path) in samples.iter().enumerate().take(block.len()) {
@@ -173,8 +173,9 @@ impl<'a> Variants<'a> {
             let scene = self.scenes[variant];
             let finished: SmallVec<[Walk; reuse::BLOCK]> = walks
                 .iter()
-                .zip(&stops)
-                .map(|(walk, (sampler, met))| walk.finished(scene, sampler, *met))
+                .zip(&starts)
+                .zip(&stopped)
+                .map(|((walk, (sampler, _)), met)| walk.finished(scene, sampler, *met))
                 .collect();
             let samples = gather(scene, &finished);
             for (pixel, (path, walk)) in samples.iter().zip(&walks).enumerate() {

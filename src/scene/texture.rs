@@ -191,6 +191,14 @@ impl Wrap {
     }
 }
 
+/// The largest whole number not above `t`, which fits an i64, and what is left. Without SSE 4.1 `f32::floor` is a call.
+#[inline(always)]
+pub(crate) fn floor(t: f32) -> (i64, f32) {
+    let towards_zero = t as i64;
+    let floor = towards_zero - i64::from(t < towards_zero as f32);
+    (floor, t - floor as f32)
+}
+
 impl Texture {
     /// The filtered value at texture coordinates `uv` ((0, 0) is the top left corner of the image). Coordinates that are not
     /// finite read the first texel.
@@ -205,12 +213,9 @@ impl Texture {
         let row = |y: i64| self.wrap[1].pixel(y, image.height);
         let fetch = |x: u32, y: u32| image.texel(x, y, self.encoding);
         match self.filter {
-            TexelFilter::Nearest => fetch(column(px.floor() as i64), row(py.floor() as i64)),
+            TexelFilter::Nearest => fetch(column(floor(px).0), row(floor(py).0)),
             TexelFilter::Bilinear => {
-                let (fx, fy) = (px - 0.5, py - 0.5);
-                let (x, y) = (fx.floor(), fy.floor());
-                let (tx, ty) = (fx - x, fy - y);
-                let (x, y) = (x as i64, y as i64);
+                let ((x, tx), (y, ty)) = (floor(px - 0.5), floor(py - 0.5));
                 let (x0, x1, y0, y1) = (column(x), column(x + 1), row(y), row(y + 1));
                 let top = fetch(x0, y0).lerp(fetch(x1, y0), tx);
                 let bottom = fetch(x0, y1).lerp(fetch(x1, y1), tx);
