@@ -148,11 +148,6 @@ impl Floats for Register {
     }
 
     #[inline(always)]
-    fn equal(self, other: Self) -> u32 {
-        self.compare::<_CMP_EQ_OQ>(other)
-    }
-
-    #[inline(always)]
     fn to_array(self) -> [f32; 8] {
         let mut values = [0.0; 8];
         // SAFETY: as for `min`; the array has room for eight floats, and the store needs no alignment.

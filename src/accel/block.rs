@@ -18,7 +18,7 @@ use super::triangle::{NOBODY, ShearedRay, UNCERTAIN, intersect};
 
 /// Triangles, one a lane.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct Block {
     /// By vertex and axis; NaN in free lanes, which no ray hits.
     vertices: [[[f32; 8]; 3]; 3],
@@ -100,11 +100,11 @@ impl Block {
         let w = bx * ay - by * ax;
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
         let zero = lanes.splat(0.0);
-        let inside = zero.less(least) | most.less(zero);
-        let on_edge = least.equal(zero) | most.equal(zero);
-        if inside | on_edge == 0 {
+        let touched = zero.at_most(least) | most.at_most(zero);
+        if touched == 0 {
             return ControlFlow::Continue(());
         }
+        let inside = zero.less(least) | most.less(zero);
 
         let scale = lanes.splat(ray.inverse[2]);
         let inverse = lanes.splat(1.0) / (u + v + w);
@@ -114,14 +114,16 @@ impl Block {
         let uncertain =
             t.abs().less(lanes.splat(UNCERTAIN) * (x * y + z * (x + y)) * (z * scale * inverse).abs());
         let in_front = zero.less(t);
+        let doubtful = touched & (uncertain | !inside);
+        let t_max_lanes = lanes.splat(t_max);
+        let hit = inside & in_front & t.at_most(t_max_lanes);
+        if doubtful | hit == 0 {
+            return ControlFlow::Continue(());
+        }
         // Rounding is monotonic: the least of them is the entry across the last axis.
         let t = along_a.min(along_b).min(along_c).max(t);
         let t = self.entry(lanes, ray, 0).max(self.entry(lanes, ray, 1).max(t));
-        let doubtful = on_edge | (inside & uncertain);
-        let mut candidates = doubtful | (inside & in_front & t.at_most(lanes.splat(t_max)));
-        if candidates == 0 {
-            return ControlFlow::Continue(());
-        }
+        let mut candidates = doubtful | (hit & t.at_most(t_max_lanes));
         let t = t.to_array();
         let barycentric = [u, v, w].map(|edge| (edge * inverse).to_array());
         while candidates != 0 {

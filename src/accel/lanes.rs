@@ -36,9 +36,6 @@ pub(super) trait Floats:
     /// Where this is less than `other` or equal to it.
     fn at_most(self, other: Self) -> u32;
 
-    /// Where both are equal.
-    fn equal(self, other: Self) -> u32;
-
     /// The lanes' values.
     fn to_array(self) -> [f32; 8];
 }
@@ -134,11 +131,6 @@ impl Floats for Array {
     #[inline(always)]
     fn at_most(self, other: Self) -> u32 {
         self.bits(other, f32::le)
-    }
-
-    #[inline(always)]
-    fn equal(self, other: Self) -> u32 {
-        self.bits(other, f32::eq)
     }
 
     #[inline(always)]

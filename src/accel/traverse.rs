@@ -15,15 +15,16 @@ pub(super) const MOST_LEVELS: usize = 26;
 pub(super) const STACK: usize = 7 * (MOST_LEVELS + 1) + 1;
 
 /// The far plane is moved out by this factor, so that rounding never makes a ray miss a box it grazes (Ize 2013, "Robust BVH
-/// Ray Traversal", JCGT 2:2): 1 + 2γ(3).
-pub(super) const ROBUST_FAR: f32 = 1.000_000_4;
+/// Ray Traversal", JCGT 2:2): 1 + 2γ(3), and the rounding of its product with the direction's reciprocal.
+pub(super) const ROBUST_FAR: f32 = 1.000_000_5;
 
 /// A ray made ready for eight boxes at a time.
 pub(super) struct Beam<L: Lanes> {
     origin: [L::Floats; 3],
-    inverse: [L::Floats; 3],
-    /// Whether it runs towards smaller coordinates.
-    backward: [bool; 3],
+    /// The direction's reciprocal for near planes and for far ones: one multiplication fewer to wait for in every node.
+    inverse: [[L::Floats; 3]; 2],
+    /// The sides that near planes are on: 1 where it runs towards smaller coordinates.
+    near: [usize; 3],
 }
 
 impl<L: Lanes> Beam<L> {
@@ -36,8 +37,8 @@ impl<L: Lanes> Beam<L> {
         let inverse = ray.direction.to_array().map(|d| 1.0 / d);
         Some(Self {
             origin: ray.origin.to_array().map(|v| lanes.splat(v)),
-            inverse: inverse.map(|v| lanes.splat(v)),
-            backward: inverse.map(|v| v < 0.0),
+            inverse: [1.0, ROBUST_FAR].map(|factor| inverse.map(|v| lanes.splat(v * factor))),
+            near: inverse.map(|v| usize::from(v.is_sign_negative())),
         })
     }
 }
@@ -53,26 +54,19 @@ impl Node {
         let [near_y, far_y] = self.slab(lanes, ray, 1);
         let [near_z, far_z] = self.slab(lanes, ray, 2);
         let entry = near_x.max(near_y).max(near_z.max(lanes.splat(0.0)));
-        let exit = far_x.min(far_y).min(far_z) * lanes.splat(ROBUST_FAR);
+        let exit = far_x.min(far_y).min(far_z);
         (entry, entry.at_most(exit.min(lanes.splat(t_max))))
     }
 
     /// Where the ray crosses the near and the far planes across an axis.
     #[inline(always)]
     fn slab<L: Lanes>(&self, lanes: L, ray: &Beam<L>, axis: usize) -> [L::Floats; 2] {
-        let [lower, upper] = &self.bounds[axis];
-        let (near, far) = if ray.backward[axis] { (upper, lower) } else { (lower, upper) };
-        let (origin, inverse) = (ray.origin[axis], ray.inverse[axis]);
-        [(lanes.load(near) - origin) * inverse, (lanes.load(far) - origin) * inverse]
+        let (sides, near, origin) = (&self.bounds[axis], ray.near[axis], ray.origin[axis]);
+        let cross =
+            |side: usize, inverse: &[L::Floats; 3]| (lanes.load(&sides[side % 2]) - origin) * inverse[axis];
+        [cross(near, &ray.inverse[0]), cross(near ^ 1, &ray.inverse[1])]
     }
-}
 
-/// A child and where the ray enters it, which is never negative, so that keys sort by the entry.
-fn key(entry: f32, child: Child) -> u64 {
-    u64::from(entry.to_bits()) << 32 | u64::from(child.0)
-}
-
-impl Node {
     /// The nearest of the children that are `entered`, at least one; the others wait, the nearer on top.
     #[inline(always)]
     pub(super) fn nearest_first(
@@ -84,13 +78,25 @@ impl Node {
         let mut next = || {
             let lane = entered.trailing_zeros() as usize % 8;
             entered &= entered - 1;
-            (entered, key(entry[lane], self.child[lane]))
+            (entered, lane)
         };
-        let (mut rest, mut first) = next();
+        // A child and where the ray enters it, which is never negative, so that keys sort by the entry.
+        let key = |lane: usize| u64::from(entry[lane].to_bits()) << 32 | u64::from(self.child[lane].0);
+        let (rest, lane) = next();
+        // Mostly there is one, which need not wait for where it is entered.
+        if rest == 0 {
+            return self.child[lane];
+        }
+        let one = key(lane);
+        let (mut rest, lane) = next();
+        let other = key(lane);
+        let mut first = one.min(other);
         let bottom = pending.len();
+        pending.push(one.max(other));
         while rest != 0 {
-            let (left, other) = next();
+            let (left, lane) = next();
             rest = left;
+            let other = key(lane);
             let farther = first.max(other);
             first = first.min(other);
             pending.push(farther);
@@ -102,6 +108,20 @@ impl Node {
             pending[at] = farther;
         }
         Child(first as u32)
+    }
+
+    /// The first that the tree keeps of the children that are `entered`, at least one; the others wait, the earlier on top.
+    #[inline(always)]
+    pub(super) fn first_kept(&self, entered: u32, pending: &mut ArrayVec<Child, STACK>) -> Child {
+        // Before the others, as the traversal waits for it.
+        let first = self.child[entered.trailing_zeros() as usize % 8];
+        let mut others = entered & (entered - 1);
+        while others != 0 {
+            let last = 31 - others.leading_zeros();
+            others ^= 1 << last;
+            pending.push(self.child[last as usize % 8]);
+        }
+        first
     }
 }
 
@@ -183,11 +203,10 @@ pub(super) fn visit<L: Lanes>(
             }
         } else {
             let node = &bvh.nodes[child.node()];
-            let (_, mut entered) = node.enter(lanes, &beam, ray.t_max);
-            while entered != 0 {
-                let last = 31 - entered.leading_zeros();
-                entered ^= 1 << last;
-                pending.push(node.child[last as usize % 8]);
+            let (_, entered) = node.enter(lanes, &beam, ray.t_max);
+            if entered != 0 {
+                child = node.first_kept(entered, &mut pending);
+                continue;
             }
         }
         match pending.pop() {

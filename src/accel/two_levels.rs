@@ -195,11 +195,10 @@ impl<V: FnMut(Hit) -> ControlFlow<()>> Query for Each<V> {
                 space.leaf(leaf, self)?;
             } else {
                 let node = &nodes[child.node()];
-                let (_, mut entered) = space.enter(node, self.t_max);
-                while entered != 0 {
-                    let last = 31 - entered.leading_zeros();
-                    entered ^= 1 << last;
-                    pending.push(node.child[last as usize % 8]);
+                let (_, entered) = space.enter(node, self.t_max);
+                if entered != 0 {
+                    child = node.first_kept(entered, &mut pending);
+                    continue;
                 }
             }
             match pending.pop() {
