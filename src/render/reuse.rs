@@ -207,8 +207,11 @@ impl Walk {
 
 /// What each path of a block found by itself and by joining the others, by its place in the block.
 pub(super) fn gather(scene: &Prepared, block: &[Walk]) -> [PathSample; BLOCK] {
-    let mut samples: [PathSample; BLOCK] =
-        std::array::from_fn(|i| block.get(i).map(Walk::path).unwrap_or_default());
+    // Written where they stay: samples handed on would be copied several times, each waiting for the last.
+    let mut samples = [PathSample::default(); BLOCK];
+    for (sample, walk) in samples.iter_mut().zip(block) {
+        *sample = walk.path();
+    }
     if !block.iter().any(Walk::is_lit_beyond) {
         return samples;
     }
