@@ -8,9 +8,10 @@ use common::lit::{
     assert_same_means, assert_same_on_any_threads, camera, clear, dull, leaning, mapped, shiny, submerged,
     sunny, walls,
 };
-use common::{scene, small};
+use common::{lambert, scene, small, square};
 use pipeline::render::{Geometry, Prepared};
 use pipeline::scene::Scene;
+use pipeline::scene::studio::add_studio_lighting;
 use pipeline::settings::{Filter, RenderSettings, Use};
 
 #[test]
@@ -59,6 +60,18 @@ fn light_paths_are_used_where_they_pay() {
         let settings = RenderSettings { seed, ..small(80, 60, 1 << (seed % 4), 6) };
         assert_eq!(why_not(&clear(), &settings), None);
         let why = why_not(&dull, &settings).expect("nothing shines");
+        assert!(why.starts_with("light paths: they would leave"), "{why}");
+    }
+}
+
+/// What both find well under an even sky, light paths find with more noise.
+#[test]
+fn light_paths_are_left_out_in_the_open() {
+    let mut open = scene(vec![(square(2.0, 0.0), lambert(0.8))], camera());
+    add_studio_lighting(&mut open);
+    for seed in 0..8 {
+        let settings = RenderSettings { seed, ..small(80, 60, 16, 6) };
+        let why = why_not(&open, &settings).expect("nothing hides the sky");
         assert!(why.starts_with("light paths: they would leave"), "{why}");
     }
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use super::Prepared;
 use super::from_light::{FromLight, with_light};
 use super::medium::{self, Medium};
-use super::mis::{Heuristic, Rivals};
+use super::mis::{Heuristic, Rivals, Share, Strategies};
 use super::offset::offset;
 use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
@@ -26,12 +26,12 @@ pub(super) struct Reflected {
     pub(super) radiance: Rgb,
     /// The density of the light's point, which the radiance has still to be divided by: together with its weight, as it may be tiny.
     pub(super) pdf: f32,
-    /// How else the light's point is found; none for lights without extent.
-    pub(super) rivals: Option<Rivals>,
+    /// Its weight, for who finds the light by BSDF sampling as well.
+    pub(super) share: Share,
 }
 
 impl Reflected {
-    const NOTHING: Self = Self { radiance: Rgb::BLACK, pdf: 1.0, rivals: None };
+    const NOTHING: Self = Self { radiance: Rgb::BLACK, pdf: 1.0, share: Share::ALL };
 }
 
 impl Arriving {
@@ -93,16 +93,16 @@ pub(super) fn direct_light(
     if is_left_out(passing.is_black()) {
         return Reflected::NOTHING;
     }
-    let rivals = (!sample.is_delta()).then(|| {
-        let towards = from_light.towards(scene, surface, shading, sample.wi);
-        let pdf_light_paths = with_light(towards, || pdf_emission(scene, sample));
-        Rivals {
-            camera: pdf_bsdf / sample.pdf,
-            light_paths: pdf_light_paths / sample.pdf,
-            heuristic: heuristic(sample),
+    let share = match sample.is_delta() {
+        true => Share::ALL,
+        false => {
+            let towards = from_light.towards(scene, surface, shading, sample.wi);
+            let light_paths = with_light(towards, || pdf_emission(scene, sample)) / sample.pdf;
+            let (camera, heuristic) = (pdf_bsdf / sample.pdf, heuristic(sample));
+            Strategies::of(scene).of_light(Rivals { camera, light_paths, heuristic })
         }
-    });
-    Reflected { radiance: f * arriving.radiance * passing, pdf: sample.pdf, rivals }
+    };
+    Reflected { radiance: f * arriving.radiance * passing, pdf: sample.pdf, share }
 }
 
 /// How BSDF sampling shares the light.

@@ -26,32 +26,45 @@ pub(super) struct Rivals {
     pub(super) heuristic: Heuristic,
 }
 
-impl Rivals {
-    /// The weight, with all of them.
-    #[inline]
-    pub(super) fn weight(self) -> f32 {
-        self.weight_in_camera() * power(self.light_paths_to_camera())
-    }
+/// What one of the camera's ways counts of a light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Share {
+    /// The weight against the camera's other way alone.
+    pub(super) in_camera: f32,
+    /// How many times as densely as both together light paths find the light.
+    pub(super) light_paths: f32,
+}
 
-    /// The weight if there were no light paths.
-    #[inline]
-    pub(super) fn weight_in_camera(self) -> f32 {
-        match self.heuristic {
+impl Share {
+    /// Of what nothing else finds.
+    pub(super) const ALL: Self = Self { in_camera: 1.0, light_paths: 0.0 };
+    const NONE: Self = Self { in_camera: 0.0, light_paths: 0.0 };
+
+    /// The weight against all.
+    #[inline(always)]
+    pub(super) fn weight(self) -> f32 {
+        self.in_camera * power(self.light_paths)
+    }
+}
+
+impl Rivals {
+    #[inline(always)]
+    fn share(self) -> Share {
+        let in_camera = match self.heuristic {
             Heuristic::Power => power(self.camera),
             Heuristic::Balance => 1.0 / (1.0 + self.camera),
+        };
+        if self.light_paths == 0.0 {
+            return Share { in_camera, light_paths: 0.0 };
         }
-    }
-
-    /// How many times as densely as both of the camera's ways together light paths find the light.
-    #[inline]
-    pub(super) fn light_paths_to_camera(self) -> f32 {
         // Beyond all bounds over beyond all bounds is as good as nothing: the camera's own weight is nothing there.
-        (self.light_paths / (1.0 + self.camera * self.camera).sqrt()).max(0.0)
+        let light_paths = (self.light_paths / (1.0 + self.camera * self.camera).sqrt()).max(0.0);
+        Share { in_camera, light_paths }
     }
 }
 
 /// The weight by the power heuristic with exponent 2 against what is `other` times as dense.
-#[inline]
+#[inline(always)]
 pub(super) fn power(other: f32) -> f32 {
     1.0 / (1.0 + other * other)
 }
@@ -70,22 +83,22 @@ impl Strategies {
     }
 
     /// What a path counts that met a light.
-    #[inline]
-    pub(super) fn w_bsdf(self, rivals: Rivals) -> f32 {
+    #[inline(always)]
+    pub(super) fn of_bsdf(self, rivals: Rivals) -> Share {
         match self {
-            Self { nee: true, mis: true } => rivals.weight(),
-            Self { nee: true, mis: false } if rivals.camera > 0.0 => 0.0,
-            _ => 1.0,
+            Self { nee: true, mis: true } => rivals.share(),
+            Self { nee: true, mis: false } if rivals.camera > 0.0 => Share::NONE,
+            _ => Share::ALL,
         }
     }
 
-    /// What a light sample counts; there are no rivals where nothing else finds the light.
-    #[inline]
-    pub(super) fn w_light(self, rivals: Option<Rivals>) -> f32 {
-        match (self, rivals) {
-            (_, None) | (Self { nee: true, mis: false }, _) => 1.0,
-            (Self { nee: true, mis: true }, Some(rivals)) => rivals.weight(),
-            (Self { nee: false, .. }, Some(_)) => 0.0,
+    /// What a sample of a light counts that has an extent.
+    #[inline(always)]
+    pub(super) fn of_light(self, rivals: Rivals) -> Share {
+        match self {
+            Self { nee: true, mis: true } => rivals.share(),
+            Self { nee: true, mis: false } => Share::ALL,
+            Self { nee: false, .. } => Share::NONE,
         }
     }
 }
@@ -108,9 +121,12 @@ mod tests {
         for heuristic in [Heuristic::Power, Heuristic::Balance] {
             for [light, bsdf, light_paths] in densities {
                 let of = |own: f32, camera: f32| {
-                    Rivals { camera: camera / own, light_paths: light_paths / own, heuristic }.weight()
+                    Rivals { camera: camera / own, light_paths: light_paths / own, heuristic }
+                        .share()
+                        .weight()
                 };
-                let camera = f64::hypot(f64::from(light), f64::from(bsdf));
+                let [light_squared, bsdf_squared] = [light, bsdf].map(|p| f64::from(p) * f64::from(p));
+                let camera = (light_squared + bsdf_squared).sqrt();
                 let of_light_paths = power((camera / f64::from(light_paths)) as f32);
                 let sum = of(light, bsdf) + of(bsdf, light) + of_light_paths;
                 assert!((sum - 1.0).abs() < 1e-6, "{heuristic:?} {light} {bsdf} {light_paths}: {sum}");
@@ -127,7 +143,7 @@ mod tests {
             let of = |own: f32, other: f32| {
                 let rivals =
                     Rivals { camera: other / own, heuristic: Heuristic::Balance, ..Rivals::default() };
-                rivals.weight() * light / own
+                rivals.share().weight() * light / own
             };
             assert!((of(chosen, bsdf) - 1.0).abs() < 1e-6 && (of(bsdf, chosen) - 1.0).abs() < 1e-6);
         }
@@ -137,7 +153,7 @@ mod tests {
     fn what_is_beyond_all_bounds_denser_leaves_nothing() {
         for light_paths in [0.0, 1.0, f32::INFINITY] {
             let rivals = Rivals { camera: f32::INFINITY, light_paths, heuristic: Heuristic::Power };
-            assert_eq!(rivals.weight(), 0.0, "{light_paths}");
+            assert_eq!(rivals.share().weight(), 0.0, "{light_paths}");
         }
     }
 }

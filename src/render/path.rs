@@ -8,7 +8,7 @@ use super::Prepared;
 use super::direct::direct_light;
 use super::from_light::FromLight;
 use super::medium::{self, Medium};
-use super::mis::{Heuristic, Rivals, Strategies};
+use super::mis::{Heuristic, Rivals, Share, Strategies, power};
 use super::replay::ReplayVertex;
 use super::reuse::{Direct, Later, Met, Onward, Trail};
 use super::surface::{Shading, Surface};
@@ -210,19 +210,20 @@ impl Walk {
         }
         let camera = last.map_or(0.0, |(pdf, pdf_light)| pdf_light / pdf);
         let rivals = Rivals { camera, light_paths: self.from_light.at_light(emission), heuristic };
-        self.add(radiance, 1.0, rivals, |rivals| Strategies::of(scene).w_bsdf(rivals));
+        self.add(radiance, 1.0, Strategies::of(scene).of_bsdf(rivals));
     }
 
-    /// Adds radiance that was found with the density `pdf` and counts a `weight` against its rivals: if it depends on light paths and the
-    /// path was divided, each that joined it there has its own.
+    /// Adds a share of radiance that was found with the density `pdf`: if it depends on light paths and the path was divided, each that
+    /// joined it there has its own.
     #[inline(always)]
-    fn add(&mut self, radiance: Rgb, pdf: f32, rivals: Rivals, weight: impl Fn(Rivals) -> f32) {
-        if rivals.light_paths > 0.0 && self.before.is_some() {
-            let in_camera = weight(Rivals { light_paths: 0.0, ..rivals });
-            let light_paths = rivals.light_paths_to_camera();
-            self.trail.later.push(Later { radiance: radiance * (in_camera / pdf), light_paths });
+    fn add(&mut self, radiance: Rgb, pdf: f32, share: Share) {
+        let radiance = radiance * (share.in_camera / pdf);
+        if share.light_paths == 0.0 {
+            self.path.radiance += radiance;
+        } else if self.before.is_some() {
+            self.trail.later.push(Later { radiance, light_paths: share.light_paths });
         } else {
-            self.path.radiance += radiance * (weight(rivals) / pdf);
+            self.path.radiance += radiance * power(share.light_paths);
         }
     }
 
@@ -279,9 +280,7 @@ impl Walk {
             if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
                 let (way, rays) = (self.from_light, &mut self.path.rays);
                 let direct = direct_light(scene, &surface, &shading, &sample, way, self.medium, rays);
-                let weight = |rivals| Strategies::of(scene).w_light(direct.rivals.map(|_| rivals));
-                let rivals = direct.rivals.unwrap_or_default();
-                self.add(self.beta * direct.radiance, direct.pdf, rivals, weight);
+                self.add(self.beta * direct.radiance, direct.pdf, direct.share);
             }
         }
         let flow = self.send_on(scene, &surface, &shading, sampler.set(self.vertices, Purpose::Bsdf));

@@ -180,7 +180,7 @@ fn measure(scene: &Prepared, can_reuse: bool) -> Worth {
         let others = f64::from(seen.others).max(RAREST);
         let both_ways = (1.0 + others * others) / others;
         let found_by_camera = sum_of(channels(seen.radiance)) * both_ways / f64::from(per_sample);
-        if found_by_camera < RARE * sum_of(mean) {
+        if found_by_camera < RARE * brightest_near(&means, cell(scene, seen.film)) {
             of_lights += moment * SPREAD_OF_LIGHTS;
         } else {
             of_lights += moment;
@@ -262,6 +262,14 @@ fn channels(radiance: Rgb) -> [f64; 3] {
 
 fn add(sum: &mut [f64; 3], value: [f64; 3]) {
     sum.iter_mut().zip(value).for_each(|(s, v)| *s += v);
+}
+
+/// The brightest of a part of the picture and those around it: a part that is mostly dark says little of what lies at its edge.
+fn brightest_near(means: &[[f64; 3]], cell: usize) -> f64 {
+    let (column, row) = (cell % CELLS as usize, cell / CELLS as usize);
+    let around = |at: usize| at.saturating_sub(1)..=(at + 1).min(CELLS as usize - 1);
+    let near = around(row).flat_map(|row| around(column).map(move |column| row * CELLS as usize + column));
+    near.map(|cell| sum_of(means[cell])).fold(0.0, f64::max)
 }
 
 fn sum_of(radiance: [f64; 3]) -> f64 {

@@ -24,7 +24,7 @@ use smallvec::SmallVec;
 use super::Prepared;
 use super::direct::{Arriving, heuristic, pdf_emission, transmittance};
 use super::from_light::{FromLight, with_light};
-use super::mis::{Heuristic, Rivals, Strategies, power};
+use super::mis::{Heuristic, Rivals, Share, Strategies, power};
 use super::path::{PathSample, Walk};
 use super::surface::{Shading, Surface};
 use crate::accel::{Hit, Ray};
@@ -272,11 +272,11 @@ fn join(
         let seen = seen(direct.wi, direct.reflected);
         let density: f32 = seen.iter().flatten().map(|seen| seen.view.density).sum();
         for Seen { view, f, pdf, towards } in seen.into_iter().flatten() {
-            let rivals = direct.heuristic.map(|heuristic| {
+            let share = direct.heuristic.map_or(Share::ALL, |heuristic| {
                 let light_paths = with_light(towards, || direct.emission) / direct.pdf;
-                Rivals { camera: pdf / direct.pdf, light_paths, heuristic }
+                strategies.of_light(Rivals { camera: pdf / direct.pdf, light_paths, heuristic })
             });
-            let scale = strategies.w_light(rivals) / (density * direct.pdf);
+            let scale = share.weight() / (density * direct.pdf);
             samples[view.pixel].radiance += view.f * f * direct.radiance * scale;
         }
     }
@@ -287,7 +287,7 @@ fn join(
             let way = towards / pdf;
             let (camera, heuristic) = (onward.pdf_light / pdf, onward.heuristic);
             let rivals = Rivals { camera, light_paths: with_light(way, || onward.emission), heuristic };
-            let mut radiance = walk.beyond() + onward.met * strategies.w_bsdf(rivals);
+            let mut radiance = walk.beyond() + onward.met * strategies.of_bsdf(rivals).weight();
             for later in &trail.later {
                 radiance += later.radiance * power(with_light(way, || later.light_paths));
             }
