@@ -18,7 +18,7 @@ use super::triangle::{NOBODY, ShearedRay, UNCERTAIN, intersect};
 
 /// Triangles, one a lane.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
+#[repr(C, align(64))] // Whole cache lines.
 pub(super) struct Block {
     /// By vertex and axis; NaN in free lanes, which no ray hits.
     vertices: [[[f32; 8]; 3]; 3],
@@ -116,14 +116,15 @@ impl Block {
         let in_front = zero.less(t);
         let doubtful = touched & (uncertain | !inside);
         let t_max_lanes = lanes.splat(t_max);
-        let hit = inside & in_front & t.at_most(t_max_lanes);
-        if doubtful | hit == 0 {
+        // Most are out already, before the boxes, which only make t larger.
+        let may_hit = inside & in_front & t.at_most(t_max_lanes);
+        if doubtful | may_hit == 0 {
             return ControlFlow::Continue(());
         }
         // Rounding is monotonic: the least of them is the entry across the last axis.
         let t = along_a.min(along_b).min(along_c).max(t);
         let t = self.entry(lanes, ray, 0).max(self.entry(lanes, ray, 1).max(t));
-        let mut candidates = doubtful | (hit & t.at_most(t_max_lanes));
+        let mut candidates = doubtful | (may_hit & t.at_most(t_max_lanes));
         let t = t.to_array();
         let barycentric = [u, v, w].map(|edge| (edge * inverse).to_array());
         while candidates != 0 {

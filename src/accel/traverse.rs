@@ -15,7 +15,7 @@ pub(super) const MOST_LEVELS: usize = 26;
 pub(super) const STACK: usize = 7 * (MOST_LEVELS + 1) + 1;
 
 /// The far plane is moved out by this factor, so that rounding never makes a ray miss a box it grazes (Ize 2013, "Robust BVH
-/// Ray Traversal", JCGT 2:2): 1 + 2γ(3), and the rounding of its product with the direction's reciprocal.
+/// Ray Traversal", JCGT 2:2): 1 + 2γ(3), and for who multiplies the direction's reciprocal by it the rounding of that.
 pub(super) const ROBUST_FAR: f32 = 1.000_000_5;
 
 /// A ray made ready for eight boxes at a time.
@@ -62,6 +62,7 @@ impl Node {
     #[inline(always)]
     fn slab<L: Lanes>(&self, lanes: L, ray: &Beam<L>, axis: usize) -> [L::Floats; 2] {
         let (sides, near, origin) = (&self.bounds[axis], ray.near[axis], ray.origin[axis]);
+        // The remainder spares a bounds check.
         let cross =
             |side: usize, inverse: &[L::Floats; 3]| (lanes.load(&sides[side % 2]) - origin) * inverse[axis];
         [cross(near, &ray.inverse[0]), cross(near ^ 1, &ray.inverse[1])]

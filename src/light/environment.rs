@@ -10,7 +10,7 @@ use crate::color::Rgb;
 use crate::math::{Real, warp};
 use crate::scene::Image;
 use crate::scene::environment::{Environment, EnvironmentMap, Equirectangular};
-use crate::scene::texture::{Encoding, Wrap, floor};
+use crate::scene::texture::{Encoding, Wrap, whole_and_rest};
 
 /// The environment, ready to be looked up and sampled.
 #[derive(Debug)]
@@ -138,7 +138,7 @@ impl ImageMap {
             Equirectangular::YUp => (uv.x * w as f32 - 0.5, uv.y * h as f32 - 0.5, Wrap::Repeat),
             Equirectangular::Aris => (uv.x * (w - 1) as f32, uv.y * (h - 1) as f32, Wrap::Clamp),
         };
-        let ((x, tx), (y, ty)) = (floor(x), floor(y));
+        let ((x, tx), (y, ty)) = (whole_and_rest(x), whole_and_rest(y));
         let (x0, x1) = (wrap.pixel(x, w), wrap.pixel(x + 1, w));
         let (y0, y1) = (Wrap::Clamp.pixel(y, h), Wrap::Clamp.pixel(y + 1, h));
         let fetch = |x: u32, y: u32| self.image.texel(x, y, Encoding::Linear).color;

@@ -26,7 +26,7 @@ pub(super) struct Reflected {
     pub(super) radiance: Rgb,
     /// The density of the light's point, which the radiance has still to be divided by: together with its weight, as it may be tiny.
     pub(super) pdf: f32,
-    /// Its weight, for who finds the light by BSDF sampling as well.
+    /// What the sample counts against the other ways to find the light.
     pub(super) share: Share,
 }
 
@@ -93,25 +93,12 @@ pub(super) fn direct_light(
     if is_left_out(passing.is_black()) {
         return Reflected::NOTHING;
     }
-    let share = match sample.is_delta() {
-        true => Share::ALL,
-        false => {
-            let towards = from_light.towards(scene, surface, shading, sample.wi);
-            let light_paths = with_light(towards, || pdf_emission(scene, sample)) / sample.pdf;
-            let (camera, heuristic) = (pdf_bsdf / sample.pdf, heuristic(sample));
-            Strategies::of(scene).of_light(Rivals { camera, light_paths, heuristic })
-        }
-    };
+    let share = Heuristic::of(sample).map_or(Share::ALL, |heuristic| {
+        let towards = from_light.towards(scene, surface, shading, sample.wi);
+        let light_paths = with_light(towards, || pdf_emission(scene, sample)) / sample.pdf;
+        Strategies::of(scene).of_light(Rivals { camera: pdf_bsdf / sample.pdf, light_paths, heuristic })
+    });
     Reflected { radiance: f * arriving.radiance * passing, pdf: sample.pdf, share }
-}
-
-/// How BSDF sampling shares the light.
-#[inline]
-pub(super) fn heuristic(sample: &LightSample) -> Heuristic {
-    match sample.place {
-        LightPlace::Far { sky: Some(_), .. } => Heuristic::Balance,
-        _ => Heuristic::Power,
-    }
 }
 
 /// The density with which paths start from the light where `sample` is, which has an extent.

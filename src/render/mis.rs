@@ -1,10 +1,11 @@
 //! Multiple importance sampling: what each way to find a light counts (Veach 1997, chapter 9).
 //!
-//! Camera paths find a light in two ways, by meeting it (BSDF sampling) and by choosing it (light sampling), light paths in a third. These
-//! are weighed against the camera's two together by the power heuristic, for which two ways are as dense as the root of the sum of their
-//! squares; what they leave the camera's two share by the [`Heuristic`] that suits the light. All combinations have the same expectation.
+//! Camera paths find a light in two ways, by meeting it (BSDF sampling) and by choosing it (light sampling), light paths in a third. Light
+//! paths are weighed against the camera's two together by the power heuristic, for which two ways are as dense as the root of the sum of their
+//! squares; what they leave the camera's two share by the [`Heuristic`] that suits the light.
 
 use super::Prepared;
+use crate::light::{LightPlace, LightSample};
 
 /// How light sampling and BSDF sampling share a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -15,6 +16,19 @@ pub(super) enum Heuristic {
     /// By their densities. The table of an environment has what BSDF sampling lacks
     /// ([`crate::light::Partner::Bsdf`]): light over the sum of both is even, which squares would spoil.
     Balance,
+}
+
+impl Heuristic {
+    /// That of a light that was sampled; none of lights without extent, which nothing else finds. Who meets a light has the same:
+    /// [`Self::Balance`] of the environment, [`Self::Power`] of surfaces.
+    #[inline(always)]
+    pub(super) fn of(sample: &LightSample) -> Option<Self> {
+        let heuristic = match sample.place {
+            LightPlace::Far { .. } => Self::Balance,
+            LightPlace::Surface { .. } | LightPlace::Point { .. } => Self::Power,
+        };
+        (!sample.is_delta()).then_some(heuristic)
+    }
 }
 
 /// How many times as densely as one of the camera's ways others find a light.
@@ -54,10 +68,11 @@ impl Rivals {
             Heuristic::Power => power(self.camera),
             Heuristic::Balance => 1.0 / (1.0 + self.camera),
         };
+        // Spares a root where there are no light paths.
         if self.light_paths == 0.0 {
             return Share { in_camera, light_paths: 0.0 };
         }
-        // Beyond all bounds over beyond all bounds is as good as nothing: the camera's own weight is nothing there.
+        // Beyond all bounds over beyond all bounds is as good as nothing: the camera's own weight is next to nothing there.
         let light_paths = (self.light_paths / (1.0 + self.camera * self.camera).sqrt()).max(0.0);
         Share { in_camera, light_paths }
     }
@@ -69,7 +84,7 @@ pub(super) fn power(other: f32) -> f32 {
     1.0 / (1.0 + other * other)
 }
 
-/// Which of the camera's ways to find a light count.
+/// Which of the camera's ways to find a light count. All combinations have the same expectation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Strategies {
     nee: bool,
@@ -151,9 +166,29 @@ mod tests {
 
     #[test]
     fn what_is_beyond_all_bounds_denser_leaves_nothing() {
-        for light_paths in [0.0, 1.0, f32::INFINITY] {
-            let rivals = Rivals { camera: f32::INFINITY, light_paths, heuristic: Heuristic::Power };
-            assert_eq!(rivals.share().weight(), 0.0, "{light_paths}");
+        for heuristic in [Heuristic::Power, Heuristic::Balance] {
+            for light_paths in [0.0, 1.0, f32::INFINITY] {
+                let rivals = Rivals { camera: f32::INFINITY, light_paths, heuristic };
+                assert_eq!(rivals.share().weight(), 0.0, "{heuristic:?} {light_paths}");
+            }
         }
+    }
+
+    #[test]
+    fn switched_off_ways_count_nothing_and_leave_all_to_the_other() {
+        let rivals = Rivals { camera: 3.0, ..Rivals::default() };
+        for (nee, mis, light, bsdf) in [
+            (true, true, 0.1, 0.1),
+            (true, false, 1.0, 0.0),
+            (false, true, 0.0, 1.0),
+            (false, false, 0.0, 1.0),
+        ] {
+            let strategies = Strategies { nee, mis };
+            let weights = [strategies.of_light(rivals), strategies.of_bsdf(rivals)].map(Share::weight);
+            assert_eq!(weights, [light, bsdf], "{strategies:?}");
+        }
+        // What light sampling can't find is left to BSDF sampling.
+        let without_mis = Strategies { nee: true, mis: false };
+        assert_eq!(without_mis.of_bsdf(Rivals::default()).weight(), 1.0);
     }
 }

@@ -8,7 +8,7 @@ use super::Prepared;
 use super::direct::direct_light;
 use super::from_light::FromLight;
 use super::medium::{self, Medium};
-use super::mis::{Heuristic, Rivals, Share, Strategies, power};
+use super::mis::{Heuristic, Rivals, Share, Strategies};
 use super::replay::ReplayVertex;
 use super::reuse::{Direct, Later, Met, Onward, Trail};
 use super::surface::{Shading, Surface};
@@ -94,17 +94,18 @@ struct Before {
 
 impl Walk {
     pub(super) fn new(scene: &Prepared, camera_ray: Ray) -> Self {
-        Self::with(scene, camera_ray, Trail::unkept())
+        Self::on_trail(scene, camera_ray, Trail::unkept())
     }
 
     /// A path that others of its block may use.
     #[inline(always)]
     pub(super) fn shared(scene: &Prepared, camera_ray: Ray) -> Self {
-        Self::with(scene, camera_ray, Trail::kept())
+        Self::on_trail(scene, camera_ray, Trail::kept())
     }
 
+    /// Inline all the way, so that it is made where it stays: a copy waits for what was just written.
     #[inline(always)]
-    fn with(scene: &Prepared, camera_ray: Ray, trail: Trail) -> Self {
+    fn on_trail(scene: &Prepared, camera_ray: Ray, trail: Trail) -> Self {
         Self {
             path: PathSample::default(),
             before: None,
@@ -217,13 +218,11 @@ impl Walk {
     /// joined it there has its own.
     #[inline(always)]
     fn add(&mut self, radiance: Rgb, pdf: f32, share: Share) {
-        let radiance = radiance * (share.in_camera / pdf);
-        if share.light_paths == 0.0 {
-            self.path.radiance += radiance;
-        } else if self.before.is_some() {
+        if share.light_paths > 0.0 && self.before.is_some() {
+            let radiance = radiance * (share.in_camera / pdf);
             self.trail.later.push(Later { radiance, light_paths: share.light_paths });
         } else {
-            self.path.radiance += radiance * power(share.light_paths);
+            self.path.radiance += radiance * (share.weight() / pdf);
         }
     }
 

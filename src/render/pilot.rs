@@ -2,11 +2,11 @@
 //!
 //! What they save is the noise of light that the camera's paths find too rarely to be measured by a few of these. But light paths meet it, and
 //! know how rarely the others do: where a light path's contribution c to a pixel has the weight 1/(1 + o²) against camera paths that
-//! are o times as dense, these alone have the second moment c²(1 + o²)²/o there; with light paths they have c²o³, and these c². That
-//! counts where a camera path would find many times what is seen there. Elsewhere evenly spread points leave hardly any noise of
-//! what moments tell: in the open under a sky light paths pay for nothing. Errors are relative to what is seen, as everywhere
-//! ([`crate::math::stats::relative_square`]); costs are counted in rays, so that the answer depends on the scene and the settings
-//! alone.
+//! are o times as dense, camera paths alone have the second moment c²(1 + o²)²/o there; beside light paths, which have c², they have c²o³.
+//! The difference, c²(1/o + 2o), is saved where a camera path would find many times what is seen there. Elsewhere evenly spread points leave
+//! hardly any noise of what moments tell: in the open under a sky light paths pay for nothing. Errors are relative to what is seen, as
+//! everywhere ([`crate::math::stats::relative_square`]); costs are counted in rays, so that the answer depends on the scene and the
+//! settings alone.
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -36,8 +36,8 @@ const RAREST: f64 = 1e-6;
 /// Light that a camera path finds as so many times what is seen there, it finds rarely. In scenes where light paths pay it is mostly 32 times
 /// and more, where they don't it is less than 16.
 const RARE: f64 = 16.0;
-/// What is left of the noise of light paths by spreading them evenly, where camera paths do not find their light rarely. Measured: 0 in closed
-/// rooms to 0.3 and 0.5 in the open.
+/// The part of light paths' noise that evenly spread points leave where camera paths find the light well too. Measured: 0 in closed rooms to 0.3
+/// and 0.5 in the open.
 const SPREAD_OF_LIGHTS: f64 = 0.15;
 
 /// What joining a neighbour's path costs, in rays as well: the shadow ray, and what the two surfaces reflect. Measured: 1 to 1.3.
@@ -67,7 +67,7 @@ pub(super) struct Choice {
 
 /// What each technique is worth, per sample of a pixel.
 struct Worth {
-    /// The error of what camera paths find of their own, and of what neighbours can use.
+    /// The error of what camera paths of independent points find: of what no neighbour can use, and of the rest.
     own: f64,
     shared: f64,
     /// That of light paths.
@@ -89,9 +89,10 @@ struct Used {
 impl Worth {
     /// Error and cost, relative to nothing in particular.
     fn of(&self, used: Used) -> (f64, f64) {
-        let shared = if used.path_reuse { self.shared / BLOCK as f64 } else { self.shared };
-        let of_camera = self.own * SPREAD + shared;
-        let left = if of_camera > 0.0 { of_camera / (self.own * SPREAD + self.shared) } else { 1.0 };
+        let with_users = |users: usize| self.own * SPREAD + self.shared / users as f64;
+        let of_camera = with_users(if used.path_reuse { BLOCK } else { 1 });
+        // What path reuse leaves of the camera's error.
+        let left = if of_camera > 0.0 { of_camera / with_users(1) } else { 1.0 };
         let of_light = if used.light_paths { self.of_lights } else { self.saved * left };
         let light_cost = if used.light_paths { self.light_cost } else { 0.0 };
         let joining_cost = if used.path_reuse { self.joining_cost } else { 0.0 };
@@ -175,12 +176,13 @@ fn measure(scene: &Prepared, can_reuse: bool) -> Worth {
     let own = sum(|look| look.own_variance).min(of_camera);
     let (mut of_lights, mut saved) = (0.0, 0.0);
     for seen in flights.iter().flat_map(|(seen, _)| seen) {
-        let mean = means[cell(scene, seen.film)];
+        let cell = cell(scene, seen.film);
+        let mean = means[cell];
         let moment = error(channels(seen.radiance).map(|c| c * c), mean);
         let others = f64::from(seen.others).max(RAREST);
         let both_ways = (1.0 + others * others) / others;
         let found_by_camera = sum_of(channels(seen.radiance)) * both_ways / f64::from(per_sample);
-        if found_by_camera < RARE * brightest_near(&means, cell(scene, seen.film)) {
+        if found_by_camera < RARE * brightest_near(&means, cell) {
             of_lights += moment * SPREAD_OF_LIGHTS;
         } else {
             of_lights += moment;

@@ -22,7 +22,7 @@ use glam::Vec3;
 use smallvec::SmallVec;
 
 use super::Prepared;
-use super::direct::{Arriving, heuristic, pdf_emission, transmittance};
+use super::direct::{Arriving, pdf_emission, transmittance};
 use super::from_light::{FromLight, with_light};
 use super::mis::{Heuristic, Rivals, Share, Strategies, power};
 use super::path::{PathSample, Walk};
@@ -145,7 +145,7 @@ impl Direct {
         }
         *rays += 1;
         let radiance = arriving.radiance * arriving.passing(scene, surface.medium_towards(sample.wi, None));
-        let heuristic = (!sample.is_delta()).then(|| heuristic(sample));
+        let heuristic = Heuristic::of(sample);
         let is_found = heuristic.is_some() && scene.light_paths.is_ok();
         let emission = if is_found { pdf_emission(scene, sample) } else { 0.0 };
         let (wi, pdf) = (sample.wi, sample.pdf);

@@ -152,6 +152,7 @@ impl<'a> Variants<'a> {
         let are_several = going.len() > 1;
         let starts: SmallVec<[(Sampler, Ray); reuse::BLOCK]> =
             block.iter().map(|&(x, y)| camera_sample(first, x, y, sample)).collect();
+        // Collected, not pushed: so they are made where they stay.
         let mut walks: SmallVec<[Walk; reuse::BLOCK]> =
             starts.iter().map(|&(_, ray)| Walk::shared(first, ray)).collect();
         let stops = |hit: &Hit| are_several && self.differs(hit);

@@ -191,12 +191,12 @@ impl Wrap {
     }
 }
 
-/// The largest whole number not above `t`, which fits an i64, and what is left. Without SSE 4.1 `f32::floor` is a call.
+/// The largest whole number not above `t`, which must fit an i64, and the rest. Without SSE 4.1 `f32::floor` is a call.
 #[inline(always)]
-pub(crate) fn floor(t: f32) -> (i64, f32) {
+pub(crate) fn whole_and_rest(t: f32) -> (i64, f32) {
     let towards_zero = t as i64;
-    let floor = towards_zero - i64::from(t < towards_zero as f32);
-    (floor, t - floor as f32)
+    let whole = towards_zero - i64::from(t < towards_zero as f32);
+    (whole, t - whole as f32)
 }
 
 impl Texture {
@@ -213,9 +213,9 @@ impl Texture {
         let row = |y: i64| self.wrap[1].pixel(y, image.height);
         let fetch = |x: u32, y: u32| image.texel(x, y, self.encoding);
         match self.filter {
-            TexelFilter::Nearest => fetch(column(floor(px).0), row(floor(py).0)),
+            TexelFilter::Nearest => fetch(column(whole_and_rest(px).0), row(whole_and_rest(py).0)),
             TexelFilter::Bilinear => {
-                let ((x, tx), (y, ty)) = (floor(px - 0.5), floor(py - 0.5));
+                let ((x, tx), (y, ty)) = (whole_and_rest(px - 0.5), whole_and_rest(py - 0.5));
                 let (x0, x1, y0, y1) = (column(x), column(x + 1), row(y), row(y + 1));
                 let top = fetch(x0, y0).lerp(fetch(x1, y0), tx);
                 let bottom = fetch(x0, y1).lerp(fetch(x1, y1), tx);
