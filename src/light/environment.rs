@@ -99,8 +99,10 @@ impl EnvironmentLight {
             }
             Map::Image(map) => {
                 let (azimuth, cos_theta, pdf) = map.table.sample(map.turned(normal), u, digits)?;
-                let wi = map.direction(azimuth, cos_theta).normalize();
-                Some((wi, self.place(wi), pdf))
+                let sin_theta = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+                let wi = map.direction(azimuth, sin_theta, cos_theta).normalize();
+                let polar = Real::atan2(sin_theta, cos_theta) / PI;
+                Some((wi, SkyPlace(Vec2::new(azimuth, polar)), pdf))
             }
         }
     }
@@ -141,25 +143,27 @@ impl ImageMap {
         let ((x, tx), (y, ty)) = (whole_and_rest(x), whole_and_rest(y));
         let (x0, x1) = (wrap.pixel(x, w), wrap.pixel(x + 1, w));
         let (y0, y1) = (Wrap::Clamp.pixel(y, h), Wrap::Clamp.pixel(y + 1, h));
-        let fetch = |x: u32, y: u32| self.image.texel(x, y, Encoding::Linear).color;
-        fetch(x0, y0).lerp(fetch(x1, y0), tx).lerp(fetch(x0, y1).lerp(fetch(x1, y1), tx), ty)
+        let places = [(x0, y0), (x1, y0), (x0, y1), (x1, y1)];
+        let [a, b, c, d] = self.image.texels(places, Encoding::Linear).map(|texel| texel.color);
+        a.lerp(b, tx).lerp(c.lerp(d, tx), ty)
     }
 
     /// Where in [0, 1]² a direction is: u by azimuth, v by the polar angle from the top.
     fn coordinates(&self, wi: Vec3) -> Vec2 {
         let [sin, cos] = self.rotation;
-        let (u, cos_theta) = match self.mapping {
+        // Beside the pole's cosine its sine: near the pole the cosine tells nothing.
+        let (u, sin_theta, cos_theta) = match self.mapping {
             Equirectangular::YUp => {
                 // The image turns by the rotation, the look-up against it.
                 let (x, z) = (wi.x * cos - wi.z * sin, wi.x * sin + wi.z * cos);
-                (0.5 + Real::atan2(z, x) / TAU, wi.y)
+                (0.5 + Real::atan2(z, x) / TAU, Vec2::new(x, z).length(), wi.y)
             }
             Equirectangular::Aris => {
                 let (x, y) = (wi.x * cos + wi.y * sin, wi.y * cos - wi.x * sin);
-                (0.5 - Real::atan2(y, x) / TAU, wi.z)
+                (0.5 - Real::atan2(y, x) / TAU, Vec2::new(x, y).length(), wi.z)
             }
         };
-        Vec2::new(u, Real::acos(cos_theta.clamp(-1.0, 1.0)) / PI)
+        Vec2::new(u, Real::atan2(sin_theta, cos_theta) / PI)
     }
 
     /// A surface's normal where the table has its directions.
@@ -172,18 +176,17 @@ impl ImageMap {
         })
     }
 
-    fn direction(&self, u: f32, cos_theta: f32) -> Vec3 {
+    /// The direction at a fraction of a turn, and at a polar angle.
+    fn direction(&self, u: f32, sin_theta: f32, cos_theta: f32) -> Vec3 {
         let [sin, cos] = self.rotation;
-        let r = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+        let (sin_turn, cos_turn) = u.sin_cos_turn();
         match self.mapping {
             Equirectangular::YUp => {
-                let phi = TAU * (u - 0.5);
-                let (x, z) = (r * Real::cos(phi), r * Real::sin(phi));
+                let (x, z) = (-sin_theta * cos_turn, -sin_theta * sin_turn);
                 Vec3::new(x * cos + z * sin, cos_theta, z * cos - x * sin)
             }
             Equirectangular::Aris => {
-                let phi = TAU * (0.5 - u);
-                let (x, y) = (r * Real::cos(phi), r * Real::sin(phi));
+                let (x, y) = (-sin_theta * cos_turn, sin_theta * sin_turn);
                 Vec3::new(x * cos - y * sin, y * cos + x * sin, cos_theta)
             }
         }
@@ -250,7 +253,7 @@ mod tests {
                             Map::Image(map) => map,
                             Map::Constant => panic!("an image"),
                         };
-                        let wi = map.direction(u / columns as f32, Real::cos(theta));
+                        let wi = map.direction(u / columns as f32, Real::sin(theta), Real::cos(theta));
                         f(wi) * f64::from(Real::sin(theta))
                     })
                     .sum::<f64>()

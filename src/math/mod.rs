@@ -2,6 +2,7 @@
 //!
 //! Everything random or transcendental comes from here, so that the same input gives the same bits on every machine.
 
+mod arctangent;
 pub mod frame;
 pub mod hash;
 mod real;

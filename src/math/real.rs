@@ -3,10 +3,12 @@
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
+use super::arctangent;
+
 /// A float: `f32` in renders, `f64` as the twin that tests measure `f32` against.
 ///
-/// Square roots are the hardware's (IEEE 754 rounds them correctly everywhere); other functions are `libm`'s, whose bits do
-/// not depend on the C library or the processor.
+/// Square roots are the hardware's (IEEE 754 rounds them correctly everywhere); other functions are `libm`'s or our own, whose
+/// bits do not depend on the C library or the processor.
 pub trait Real:
     Copy
     + Debug
@@ -202,7 +204,7 @@ macro_rules! real {
     };
 }
 
-real!(f32, 6, libm::sinf, libm::cosf, libm::logf, libm::expf, libm::powf, libm::atan2f, libm::acosf);
+real!(f32, 6, libm::sinf, libm::cosf, libm::logf, libm::expf, libm::powf, arctangent::atan2, libm::acosf);
 real!(f64, 11, libm::sin, libm::cos, libm::log, libm::exp, libm::pow, libm::atan2, libm::acos);
 
 #[cfg(test)]

@@ -115,22 +115,39 @@ impl Image {
     /// The texel at a pixel inside the image.
     #[inline]
     pub fn texel(&self, x: u32, y: u32, encoding: Encoding) -> Texel {
+        let [texel] = self.texels([(x, y)], encoding);
+        texel
+    }
+
+    /// The texels at pixels inside the image: what they are stored as is asked once for all.
+    #[inline]
+    pub fn texels<const N: usize>(&self, places: [(u32, u32); N], encoding: Encoding) -> [Texel; N] {
         let channels = usize::from(self.channels);
-        let first = (y as usize * self.width as usize + x as usize) * channels;
-        let stored = first..first + channels;
+        let stored = |(x, y): (u32, u32)| {
+            let first = (y as usize * self.width as usize + x as usize) * channels;
+            first..first + channels
+        };
         let decode = |value: f32| match encoding {
             Encoding::Linear => value,
             Encoding::Srgb => linear_from_srgb(value),
         };
         match (&self.pixels, encoding) {
-            (Pixels::U8(v), Encoding::Linear) => Texel::of(&v[stored], unit_of_u8, unit_of_u8),
+            (Pixels::U8(v), Encoding::Linear) => {
+                places.map(|place| Texel::of(&v[stored(place)], unit_of_u8, unit_of_u8))
+            }
             (Pixels::U8(v), Encoding::Srgb) => {
                 let table = srgb_table();
-                Texel::of(&v[stored], |code| table[usize::from(code)], unit_of_u8)
+                places.map(|place| Texel::of(&v[stored(place)], |code| table[usize::from(code)], unit_of_u8))
             }
-            (Pixels::U16(v), _) => Texel::of(&v[stored], |code| decode(unit_of_u16(code)), unit_of_u16),
-            (Pixels::F32(v), _) => Texel::of(&v[stored], decode, |alpha| alpha),
-            (Pixels::Undecoded, _) => Texel { color: Rgb::WHITE, alpha: 1.0 },
+            (Pixels::U16(v), _) => places
+                .map(|place| Texel::of(&v[stored(place)], |code| decode(unit_of_u16(code)), unit_of_u16)),
+            (Pixels::F32(v), Encoding::Linear) => {
+                places.map(|place| Texel::of(&v[stored(place)], |value| value, |alpha| alpha))
+            }
+            (Pixels::F32(v), Encoding::Srgb) => {
+                places.map(|place| Texel::of(&v[stored(place)], linear_from_srgb, |alpha| alpha))
+            }
+            (Pixels::Undecoded, _) => [Texel { color: Rgb::WHITE, alpha: 1.0 }; N],
         }
     }
 }
@@ -211,15 +228,16 @@ impl Texture {
         let (px, py) = (position(uv.x, image.width), position(uv.y, image.height));
         let column = |x: i64| self.wrap[0].pixel(x, image.width);
         let row = |y: i64| self.wrap[1].pixel(y, image.height);
-        let fetch = |x: u32, y: u32| image.texel(x, y, self.encoding);
         match self.filter {
-            TexelFilter::Nearest => fetch(column(whole_and_rest(px).0), row(whole_and_rest(py).0)),
+            TexelFilter::Nearest => {
+                image.texel(column(whole_and_rest(px).0), row(whole_and_rest(py).0), self.encoding)
+            }
             TexelFilter::Bilinear => {
                 let ((x, tx), (y, ty)) = (whole_and_rest(px - 0.5), whole_and_rest(py - 0.5));
                 let (x0, x1, y0, y1) = (column(x), column(x + 1), row(y), row(y + 1));
-                let top = fetch(x0, y0).lerp(fetch(x1, y0), tx);
-                let bottom = fetch(x0, y1).lerp(fetch(x1, y1), tx);
-                top.lerp(bottom, ty)
+                let places = [(x0, y0), (x1, y0), (x0, y1), (x1, y1)];
+                let [a, b, c, d] = image.texels(places, self.encoding);
+                a.lerp(b, tx).lerp(c.lerp(d, tx), ty)
             }
         }
     }
