@@ -158,6 +158,39 @@ impl Walk {
         None
     }
 
+    /// What a path finds whose first ray meets no surface.
+    #[inline]
+    pub(super) fn of_background(scene: &Prepared, camera_ray: Ray) -> PathSample {
+        let mut walk = Self::new(scene, camera_ray);
+        walk.begin(scene, None);
+        walk.path
+    }
+
+    /// Goes on as below, where the first ray met what [`first_surface`] says.
+    #[inline(always)]
+    pub(super) fn go_on_from_first(
+        &mut self,
+        scene: &Prepared,
+        sampler: &Sampler,
+        first: Option<Hit>,
+        stops: impl Fn(&Hit) -> bool,
+    ) -> Option<Hit> {
+        self.begin(scene, first.as_ref());
+        match first {
+            Some(hit) if !stops(&hit) => self.go_on(scene, sampler, Some(hit), stops, |_| ()),
+            stopped => stopped,
+        }
+    }
+
+    /// Its first ray was traced, and met a surface or none.
+    #[inline(always)]
+    fn begin(&mut self, scene: &Prepared, first: Option<&Hit>) {
+        (self.vertices, self.path.rays) = (1, 1);
+        if first.is_none() {
+            self.leave_scene(scene);
+        }
+    }
+
     /// The same after it went on to its end from the surface `met` where it stopped, if it did.
     pub(super) fn finished(&self, scene: &Prepared, sampler: &Sampler, met: Option<Hit>) -> Self {
         let mut walk = self.clone();
@@ -392,6 +425,12 @@ impl Walk {
         }
         ControlFlow::Continue(())
     }
+}
+
+/// What the camera's ray of a path meets.
+#[inline]
+pub(super) fn first_surface(scene: &Prepared, sampler: &Sampler, ray: &Ray) -> Option<Hit> {
+    next_surface(scene, sampler, 1, ray, ray.direction)
 }
 
 /// The nearest surface that is there for this path: a partly transparent one lets its share of paths pass. Each triangle decides

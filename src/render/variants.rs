@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use super::Prepared;
 use super::film::{camera_sample, sample_pixel};
 use super::light_image;
-use super::path::{PathSample, Walk};
+use super::path::{PathSample, Walk, first_surface};
 use super::reuse::{self, gather};
 use super::tile;
 use crate::accel::{Hit, Ray};
@@ -152,6 +152,18 @@ impl<'a> Variants<'a> {
         let are_several = going.len() > 1;
         let starts: SmallVec<[(Sampler, Ray); reuse::BLOCK]> =
             block.iter().map(|&(x, y)| camera_sample(first, x, y, sample)).collect();
+        let seen: SmallVec<[Option<Hit>; reuse::BLOCK]> =
+            starts.iter().map(|(sampler, ray)| first_surface(first, sampler, ray)).collect();
+        if seen.iter().all(Option::is_none) {
+            // No paths to be joined, nor to be made for that.
+            for (pixel, (_, ray)) in starts.iter().enumerate() {
+                let path = Walk::of_background(first, *ray);
+                for &variant in going {
+                    found(variant, pixel, &path, if are_several { path.rays } else { 0 });
+                }
+            }
+            return;
+        }
         // Collected, not pushed: so they are made where they stay.
         let mut walks: SmallVec<[Walk; reuse::BLOCK]> =
             starts.iter().map(|&(_, ray)| Walk::shared(first, ray)).collect();
@@ -159,7 +171,8 @@ impl<'a> Variants<'a> {
         let stopped: SmallVec<[Option<Hit>; reuse::BLOCK]> = walks
             .iter_mut()
             .zip(&starts)
-            .map(|(walk, (sampler, _))| walk.go_on(first, sampler, None, stops, |_| ()))
+            .zip(&seen)
+            .map(|((walk, (sampler, _)), &seen)| walk.go_on_from_first(first, sampler, seen, stops))
             .collect();
         if stopped.iter().all(Option::is_none) {
             let samples = gather(first, &walks);
