@@ -57,7 +57,7 @@ pub struct RenderSettings {
     #[serde(skip_serializing_if = "is_default")]
     pub light_paths: Use,
     /// Let neighbouring pixels use each other's paths from their second surfaces on: far less noise of indirect light, which is alike in blocks
-    /// of two by two pixels then.
+    /// of two by two pixels then, or of four by two where neighbours see alike.
     #[serde(skip_serializing_if = "is_default")]
     pub path_reuse: Use,
 }

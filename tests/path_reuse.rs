@@ -5,10 +5,10 @@ mod common;
 use std::sync::Arc;
 
 use common::lit::{
-    assert_same_means, assert_same_on_any_threads, bottled, camera, clear, covered, dull, facing, lamp,
-    leaning, rendered, shiny, sunny,
+    assert_same_means, assert_same_on_any_threads, ball, bottled, camera, clear, covered, dull, facing, lamp,
+    leaning, rendered, shiny, sunny, walls,
 };
-use common::{lambert, scene, small};
+use common::{lambert, metal, scene, small};
 use glam::Vec3;
 use pipeline::render::{Geometry, Prepared, replay};
 use pipeline::scene::{Camera, Scene};
@@ -19,8 +19,13 @@ fn plain(spp: u32) -> RenderSettings {
     RenderSettings { light_paths: Use::Never, path_reuse: Use::Never, ..small(32, 24, spp, 5) }
 }
 
+const SMALL: (u32, u32) = (2, 2);
+const LARGE: (u32, u32) = (4, 2);
+
+/// In blocks of either size.
 #[test]
 fn with_and_without_path_reuse_every_part_of_a_picture_has_the_same_mean() {
+    let mut blocks = std::collections::BTreeSet::new();
     for (what, world, filter) in [
         ("dull", dull(), Filter::Box),
         ("shiny", shiny(), Filter::Tent),
@@ -38,8 +43,10 @@ fn with_and_without_path_reuse_every_part_of_a_picture_has_the_same_mean() {
             let without = RenderSettings { filter, light_paths, ..plain(256) };
             let with = RenderSettings { path_reuse: Use::Always, spp: 96, ..without.clone() };
             assert_same_means(&format!("{what}, light paths {light_paths:?}"), &world, &with, &without);
+            blocks.extend(prepared(&world, &with).reuse_block());
         }
     }
+    assert_eq!(Vec::from_iter(blocks), [SMALL, LARGE]);
 }
 
 /// Blocks at the edges are smaller.
@@ -63,20 +70,24 @@ fn prepared(world: &Scene, settings: &RenderSettings) -> Prepared {
 fn replayed_samples_have_the_mean_that_the_picture_has() {
     let settings =
         RenderSettings { path_reuse: Use::Always, ..RenderSettings { width: Some(33), ..plain(16) } };
-    let world = shiny();
-    let beauty = rendered(&Arc::new(world.clone()), &settings)
-        .raster
-        .picture()
-        .rgb()
-        .expect("colour")
-        .map(<[f32]>::to_vec);
-    let scene = prepared(&world, &settings);
-    for (x, y) in [(5, 7), (16, 12), (17, 13), (32, 10), (20, 20)] {
-        let samples = (0..16).map(|sample| replay(&scene, x, y, sample).radiance);
-        let mean = samples.fold(0.0, |sum, radiance| sum + f64::from(radiance.g)) / 16.0;
-        let pixel = f64::from(beauty[1][(y * 33 + x) as usize]);
-        assert!((mean - pixel).abs() < 1e-6 * (1.0 + pixel), "{x}, {y}: {mean} {pixel}");
+    let mut blocks = std::collections::BTreeSet::new();
+    for world in [dull(), shiny(), bottled(), leaning()] {
+        let beauty = rendered(&Arc::new(world.clone()), &settings)
+            .raster
+            .picture()
+            .rgb()
+            .expect("colour")
+            .map(<[f32]>::to_vec);
+        let scene = prepared(&world, &settings);
+        blocks.extend(scene.reuse_block());
+        for (x, y) in [(5, 7), (16, 12), (17, 13), (32, 10), (20, 20)] {
+            let samples = (0..16).map(|sample| replay(&scene, x, y, sample).radiance);
+            let mean = samples.fold(0.0, |sum, radiance| sum + f64::from(radiance.g)) / 16.0;
+            let pixel = f64::from(beauty[1][(y * 33 + x) as usize]);
+            assert!((mean - pixel).abs() < 1e-6 * (1.0 + pixel), "{x}, {y}: {mean} {pixel}");
+        }
     }
+    assert_eq!(Vec::from_iter(blocks), [SMALL, LARGE]);
 }
 
 fn error(world: &Arc<Scene>, settings: &RenderSettings, reference: &[Vec<f32>; 3]) -> f64 {
@@ -118,6 +129,24 @@ fn paths_are_reused_where_it_pays() {
         assert_eq!(why_not(&dull(), &settings), None);
         let why = why_not(&open, &settings).expect("nothing is lit indirectly");
         assert!(why.contains("it would leave"), "{why}");
+    }
+}
+
+/// Balls that are all but mirrors, in a room of them.
+fn mirrors() -> Scene {
+    let walls = walls().into_iter().map(|(mesh, _)| (mesh, metal(0.05)));
+    let ball = |radius, center| (ball(radius, center), metal(0.05));
+    let balls = [ball(0.55, Vec3::new(-0.7, 0.6, 0.0)), ball(0.4, Vec3::new(0.6, 0.4, 0.5))];
+    scene(walls.chain(balls).chain([lamp()]).collect(), camera())
+}
+
+/// Where all reflect light evenly; but in a mirror what one pixel sees is no use to another.
+#[test]
+fn blocks_are_as_large_as_neighbours_see_alike() {
+    for seed in 0..8 {
+        let settings = RenderSettings { seed, ..small(80, 60, 1 << (seed % 4), 6) };
+        assert_eq!(prepared(&dull(), &settings).reuse_block(), Some(LARGE), "{seed}");
+        assert_eq!(prepared(&mirrors(), &settings).reuse_block(), None, "{seed}");
     }
 }
 

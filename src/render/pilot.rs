@@ -1,6 +1,6 @@
-//! Whether light paths pay for themselves in a scene, told by a few paths before the render.
+//! Whether light paths and those of neighbouring pixels pay for themselves in a scene, told by a few paths before the render.
 //!
-//! What they save is the noise of light that the camera's paths find too rarely to be measured by a few of these. But light paths meet it, and
+//! What neighbours save is seen in a few blocks of pixels. What light paths save is the noise of light that the camera's paths find too rarely to be measured by a few of these. But light paths meet it, and
 //! know how rarely the others do: where a light path's contribution c to a pixel has the weight 1/(1 + o²) against camera paths that
 //! are o times as dense, camera paths alone have the second moment c²(1 + o²)²/o there; beside light paths, which have c², they have c²o³.
 //! The difference, c²(1/o + 2o), is saved where a camera path would find many times what is seen there. Elsewhere evenly spread points leave
@@ -10,11 +10,12 @@
 
 use glam::Vec2;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::Prepared;
 use super::light_path::{self, Seen};
 use super::path::Walk;
-use super::reuse::{BLOCK, gather};
+use super::reuse::{BlockSize, MOST, block_around, gather};
 use crate::color::Rgb;
 use crate::math::hash::mix64;
 use crate::math::sobol::{Purpose, Sampler};
@@ -40,8 +41,15 @@ const RARE: f64 = 16.0;
 /// and 0.5 in the open.
 const SPREAD_OF_LIGHTS: f64 = 0.15;
 
-/// What joining a neighbour's path costs, in rays as well: the shadow ray, and what the two surfaces reflect. Measured: 1 to 1.3.
-const JOINING_COST: f64 = 1.2;
+/// One block of pixels for so many that are looked at, to see what neighbours' paths bring.
+const LOOKS_PER_MEETING: u32 = 16;
+/// What a path costs that neighbours may join, and each that does, in rays as well: the shadow ray, and what the surfaces reflect. Measured:
+/// 2.4 to 4 for three neighbours, 0.6 to 1.1 for one more.
+const JOINABLE_COST: f64 = 1.0;
+const JOINING_COST: f64 = 0.85;
+/// Light paths, and blocks of eight instead of four, have to leave no more than this of the work, or they are not used: the ones take memory,
+/// the others make noise blotchier, and jobs of a sweep that do the same share more.
+const LEAST_GAIN: f64 = 0.92;
 /// The noise that evenly spread points leave of what independent ones make, in the part of a path's light that its neighbours have no use for:
 /// emission and light sampled at the first surface. In the rest they are little better. Measured: from 0.2 on the shader ball to 1 on the statue.
 const SPREAD: f64 = 1.0 / 3.0;
@@ -59,10 +67,18 @@ struct Look {
     shared: u64,
 }
 
+/// A block of eight pixels that use each other's paths: the variances of one sample's part that neighbours can use, if none joins, and if
+/// those of each size of block do, summed up over the pixels.
+struct Meeting {
+    cell: usize,
+    alone: [f64; 3],
+    joined: [[f64; 3]; 2],
+}
+
 /// What pays in a scene, or what it would be worth.
 pub(super) struct Choice {
     pub(super) light_paths: Result<(), String>,
-    pub(super) path_reuse: Result<(), String>,
+    pub(super) path_reuse: Result<BlockSize, String>,
 }
 
 /// What each technique is worth, per sample of a pixel.
@@ -70,38 +86,45 @@ struct Worth {
     /// The error of what camera paths of independent points find: of what no neighbour can use, and of the rest.
     own: f64,
     shared: f64,
+    /// What joining leaves of the rest, in blocks of each size.
+    left: [f64; 2],
     /// That of light paths.
     of_lights: f64,
     /// More error of camera paths without light paths, before neighbours share it.
     saved: f64,
-    /// Rays of light paths and of joining, for each ray of camera paths.
+    /// Rays of light paths, for each ray of camera paths.
     light_cost: f64,
-    joining_cost: f64,
+    /// Paths that neighbours may join, for each ray of camera paths.
+    joinable: f64,
 }
 
 /// What is used.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Used {
     light_paths: bool,
-    path_reuse: bool,
+    path_reuse: Option<BlockSize>,
 }
 
 impl Worth {
     /// Error and cost, relative to nothing in particular.
     fn of(&self, used: Used) -> (f64, f64) {
-        let with_users = |users: usize| self.own * SPREAD + self.shared / users as f64;
-        let of_camera = with_users(if used.path_reuse { BLOCK } else { 1 });
+        let with = |left: f64| self.own * SPREAD + self.shared * left;
+        let of_camera = with(used.path_reuse.map_or(1.0, |block| self.left[block as usize]));
         // What path reuse leaves of the camera's error.
-        let left = if of_camera > 0.0 { of_camera / with_users(1) } else { 1.0 };
+        let left = if of_camera > 0.0 { of_camera / with(1.0) } else { 1.0 };
         let of_light = if used.light_paths { self.of_lights } else { self.saved * left };
         let light_cost = if used.light_paths { self.light_cost } else { 0.0 };
-        let joining_cost = if used.path_reuse { self.joining_cost } else { 0.0 };
+        let of_path = |block: BlockSize| JOINABLE_COST + JOINING_COST * f64::from(block.pixels() - 1);
+        let joining_cost = self.joinable * used.path_reuse.map_or(0.0, of_path);
         (of_camera + of_light, 1.0 + light_cost + joining_cost)
     }
 
+    /// Error times cost, and more for what has to save some.
     fn work(&self, used: Used) -> f64 {
         let (error, cost) = self.of(used);
-        error * cost
+        let handicap = |is_used: bool| if is_used { 1.0 / LEAST_GAIN } else { 1.0 };
+        let (light_paths, large) = (used.light_paths, used.path_reuse == Some(BlockSize::Eight));
+        error * cost * handicap(light_paths) * handicap(large)
     }
 
     /// What a technique that `with` has and `without` has not would bring.
@@ -113,33 +136,34 @@ impl Worth {
     }
 }
 
-/// Tries light paths in `scene`, if it has them, and path reuse if `can_reuse`, and chooses what the settings leave open.
+/// Tries light paths in `scene`, if it has them, and path reuse if `can_reuse`, and chooses what the settings leave open: the size of blocks
+/// in any case.
 pub(super) fn choose(scene: &Prepared, can_reuse: bool) -> Choice {
-    let mut choice = Choice { light_paths: Ok(()), path_reuse: Ok(()) };
     let can_light = scene.light_paths.is_ok();
-    let is_open = |is_possible: bool, used: Use| is_possible && used == Use::Auto;
-    let (light_is_open, reuse_is_open) =
-        (is_open(can_light, scene.settings.light_paths), is_open(can_reuse, scene.settings.path_reuse));
-    if !(light_is_open || reuse_is_open) {
+    let mut choice = Choice { light_paths: Ok(()), path_reuse: Ok(BlockSize::Four) };
+    let light_is_open = can_light && scene.settings.light_paths == Use::Auto;
+    let reuse_is_open = can_reuse && scene.settings.path_reuse == Use::Auto;
+    if !(light_is_open || can_reuse) {
         return choice;
     }
     let worth = measure(scene, can_reuse);
-    let all = Used { light_paths: can_light, path_reuse: can_reuse };
-    let ways = [(false, false), (true, false), (false, true), (true, true)];
-    let best = ways
-        .map(|(light_paths, path_reuse)| Used { light_paths, path_reuse })
-        .into_iter()
-        .filter(|used| light_is_open || used.light_paths == all.light_paths)
-        .filter(|used| reuse_is_open || used.path_reuse == all.path_reuse)
-        .filter(|used| used.light_paths <= can_light && used.path_reuse <= can_reuse)
-        .min_by(|&a, &b| worth.work(a).total_cmp(&worth.work(b)));
+    let may_be = |is_open: bool, is_possible: bool, with: bool| {
+        if with { is_possible } else { is_open || !is_possible }
+    };
+    let with_light = [false, true].into_iter().filter(|&with| may_be(light_is_open, can_light, with));
+    let sizes = [None, Some(BlockSize::Four), Some(BlockSize::Eight)];
+    let with_reuse = sizes.into_iter().filter(|size| may_be(reuse_is_open, can_reuse, size.is_some()));
+    let ways = with_light
+        .flat_map(|light_paths| with_reuse.clone().map(move |path_reuse| Used { light_paths, path_reuse }));
+    let best = ways.min_by(|&a, &b| worth.work(a).total_cmp(&worth.work(b)));
     let Some(best) = best else { return choice };
     if light_is_open && !best.light_paths {
         choice.light_paths = Err(format!("they {}", worth.told(Used { light_paths: true, ..best }, best)));
     }
-    if reuse_is_open && !best.path_reuse {
-        choice.path_reuse = Err(format!("it {}", worth.told(Used { path_reuse: true, ..best }, best)));
-    }
+    choice.path_reuse = best.path_reuse.ok_or_else(|| {
+        let with = Used { path_reuse: Some(BlockSize::Four), ..best };
+        format!("it {}", worth.told(with, best))
+    });
     choice
 }
 
@@ -150,6 +174,8 @@ fn measure(scene: &Prepared, can_reuse: bool) -> Worth {
     let looks: Vec<Look> = (0..looks as u32).into_par_iter().map(|i| look(scene, i, can_reuse)).collect();
     let per_sample = scene.light_paths.as_ref().map_or(0, |plan| plan.per_sample);
     let per_look = f64::from(per_sample) / pixels as f64 * f64::from(PER_PIXEL);
+    let meetings = if can_reuse { looks.len() as u32 / LOOKS_PER_MEETING } else { 0 };
+    let meetings: Vec<Meeting> = (0..meetings).into_par_iter().filter_map(|i| meet(scene, i)).collect();
     let paths = ((looks.len() as f64 * per_look) as u32).max(per_sample.min(1));
     let flights: Vec<(Vec<Seen>, u64)> = (0..paths).into_par_iter().map(|i| fly(scene, i)).collect();
 
@@ -174,6 +200,14 @@ fn measure(scene: &Prepared, can_reuse: bool) -> Worth {
     };
     let of_camera = sum(|look| look.variance);
     let own = sum(|look| look.own_variance).min(of_camera);
+    let sum = |variance: &dyn Fn(&Meeting) -> [f64; 3]| -> f64 {
+        meetings.iter().map(|meeting| error(variance(meeting), means[meeting.cell])).sum()
+    };
+    let alone = sum(&|meeting| meeting.alone);
+    let left = BlockSize::ALL.map(|size| {
+        let joined = sum(&|meeting| meeting.joined[size as usize]);
+        if alone > 0.0 { joined / alone } else { 1.0 }
+    });
     let (mut of_lights, mut saved) = (0.0, 0.0);
     for seen in flights.iter().flat_map(|(seen, _)| seen) {
         let cell = cell(scene, seen.film);
@@ -192,14 +226,15 @@ fn measure(scene: &Prepared, can_reuse: bool) -> Worth {
     let scale = 1.0 / (f64::from(paths.max(1)) * f64::from(per_sample.max(1)) * pixels as f64);
     let camera_rays = looks.iter().map(|look| look.rays).sum::<u64>() as f64;
     let light_rays = flights.iter().map(|(_, rays)| rays).sum::<u64>() as f64;
-    let joining_rays = looks.iter().map(|look| look.shared).sum::<u64>() as f64 * (BLOCK - 1) as f64;
+    let shared_paths = looks.iter().map(|look| look.shared).sum::<u64>() as f64;
     Worth {
         own,
         shared: of_camera - own,
+        left,
         of_lights: of_lights * scale,
         saved: saved * scale,
         light_cost: COST * light_rays / camera_rays,
-        joining_cost: JOINING_COST * joining_rays / camera_rays,
+        joinable: shared_paths / camera_rays,
     }
 }
 
@@ -208,33 +243,94 @@ fn look(scene: &Prepared, index: u32, can_reuse: bool) -> Look {
     let [u, v, ..] = sampler(scene, 0, index, 1).set(0, Purpose::Camera);
     let corner = Vec2::new((u * width as f32).floor(), (v * height as f32).floor());
     let (mut rays, mut shared) = (0, 0);
-    // All of a sample and its own part.
-    let samples: [[[f64; 3]; 2]; PER_PIXEL as usize] = std::array::from_fn(|sample| {
+    // All of a sample, its own part, and of that what is seen glowing.
+    let samples: [[[f64; 3]; 3]; PER_PIXEL as usize] = std::array::from_fn(|sample| {
         let sampler = sampler(scene, 1 + index, sample as u32, PER_PIXEL);
         let [u0, u1, u2, u3] = sampler.set(0, Purpose::Camera);
         let ray = scene.camera.ray(corner + Vec2::new(u0, u1), [u2, u3]);
         let mut walk = if can_reuse { Walk::shared(scene, ray) } else { Walk::new(scene, ray) };
-        walk.go_on(scene, &sampler, None, |_| false, |_| ());
+        let mut visible = None;
+        walk.go_on(scene, &sampler, None, |_| false, |vertex| _ = visible.get_or_insert(vertex.radiance));
         shared += u64::from(walk.is_lit_beyond());
         let own = walk.path();
-        let [all, ..] = gather(scene, std::slice::from_ref(&walk));
+        let mut all = own;
+        gather(scene, std::slice::from_ref(&walk), |(_, sample)| all = *sample);
         rays += all.rays;
-        if all.radiance.is_finite() {
-            [channels(all.radiance), channels(own.radiance)]
-        } else {
-            [[0.0; 3]; 2]
+        if !all.radiance.is_finite() {
+            return [[0.0; 3]; 3];
         }
+        let visible = visible.unwrap_or(all.radiance);
+        [all.radiance, own.radiance, visible].map(channels)
     });
     let count = f64::from(PER_PIXEL);
-    let moments = |part: usize| -> ([f64; 3], [f64; 3]) {
-        let sum = |f: &dyn Fn(usize, &[f64; 3]) -> f64| -> [f64; 3] {
-            std::array::from_fn(|c| samples.iter().map(|sample| f(c, &sample[part])).sum())
-        };
-        let mean = sum(&|c, sample| sample[c] / count);
-        (mean, sum(&|c, sample| (sample[c] - mean[c]) * (sample[c] - mean[c]) / (count - 1.0)))
+    let mean = |of: &dyn Fn(&[[f64; 3]; 3]) -> [f64; 3]| -> [f64; 3] {
+        std::array::from_fn(|c| samples.iter().map(|sample| of(sample)[c] / count).sum())
     };
-    let ((mean, variance), (_, own_variance)) = (moments(0), moments(1));
-    Look { cell: cell(scene, corner + 0.5), mean, variance, own_variance, rays, shared }
+    // What glows hides or shows at its edges alone, which evenly spread points hardly miss.
+    let variance = |part: usize| -> [f64; 3] {
+        let of = |sample: &[[f64; 3]; 3]| std::array::from_fn(|c| sample[part][c] - sample[2][c]);
+        let mean = mean(&of);
+        let squares = |c: usize| samples.iter().map(move |sample| of(sample)[c] - mean[c]).map(|v| v * v);
+        std::array::from_fn(|c| squares(c).sum::<f64>() / (count - 1.0))
+    };
+    let (variance, own_variance) = (variance(0), variance(1));
+    Look {
+        cell: cell(scene, corner + 0.5),
+        mean: mean(&|sample| sample[0]),
+        variance,
+        own_variance,
+        rays,
+        shared,
+    }
+}
+
+/// Takes two samples of a block of eight pixels; none if the picture is too small for one.
+fn meet(scene: &Prepared, index: u32) -> Option<Meeting> {
+    let ((width, height), (columns, rows)) = (scene.size(), BlockSize::Eight.sides());
+    let [u, v, ..] = sampler(scene, MEETING_PLACES, index, 1).set(0, Purpose::Camera);
+    let start = |u: f32, length: u32, side: u32| {
+        let blocks = length / side;
+        (blocks > 0).then(|| ((u * blocks as f32) as u32).min(blocks - 1) * side)
+    };
+    let corner = (start(u, width, columns)?, start(v, height, rows)?);
+    // The two blocks of four one after the other.
+    let sides = BlockSize::Four.sides();
+    let halves = [corner, (corner.0 + sides.0, corner.1)];
+    let places = halves.into_iter().flat_map(|half| block_around(half, sides, scene.size()));
+    let places: SmallVec<[_; MOST]> = places.collect();
+    // Each pixel's part that others can use, in blocks of so many.
+    let sample = |sample: u32| -> [[[f64; 3]; MOST]; 3] {
+        let walk = |(pixel, &(x, y)): (usize, &(u32, u32))| {
+            let set = MEETING_PLACES + 1 + index * MOST as u32 + pixel as u32;
+            let sampler = sampler(scene, set, sample, 2);
+            let [u0, u1, u2, u3] = sampler.set(0, Purpose::Camera);
+            let film = Vec2::new(x as f32 + u0, y as f32 + u1);
+            let mut walk = Walk::shared(scene, scene.camera.ray(film, [u2, u3]));
+            walk.go_on(scene, &sampler, None, |_| false, |_| ());
+            walk
+        };
+        let walks: SmallVec<[Walk; MOST]> = places.iter().enumerate().map(walk).collect();
+        [1, BlockSize::Four.pixels() as usize, MOST].map(|size| {
+            let mut parts = [[0.0; 3]; MOST];
+            for (block, parts) in walks.chunks(size).zip(parts.chunks_mut(size)) {
+                gather(scene, block, |(pixel, found)| {
+                    let (all, own) = (channels(found.radiance), channels(block[pixel].path().radiance));
+                    parts[pixel] = std::array::from_fn(|c| all[c] - own[c]);
+                });
+            }
+            parts
+        })
+    };
+    let (a, b) = (sample(0), sample(1));
+    let variance = |way: usize| -> [f64; 3] {
+        let halves =
+            |c: usize| a[way].iter().zip(&b[way]).map(move |(a, b)| (a[c] - b[c]) * (a[c] - b[c]) / 2.0);
+        std::array::from_fn(|c| halves(c).sum())
+    };
+    let [alone, four, eight] = [0, 1, 2].map(variance);
+    let is_usable = alone.iter().chain(&four).chain(&eight).all(|v| v.is_finite());
+    let cell = cell(scene, Vec2::new(corner.0 as f32, corner.1 as f32) + 0.5);
+    is_usable.then_some(Meeting { cell, alone, joined: [four, eight] })
 }
 
 fn fly(scene: &Prepared, index: u32) -> (Vec<Seen>, u64) {
@@ -246,6 +342,9 @@ fn fly(scene: &Prepared, index: u32) -> (Vec<Seen>, u64) {
     });
     (found, rays)
 }
+
+/// The set of numbers for the places where blocks are looked at; their pixels have those above it, single pixels those below.
+const MEETING_PLACES: u32 = 1 << 30;
 
 /// Numbers that the render doesn't use: an answer that knew them would bias it.
 fn sampler(scene: &Prepared, set: u32, index: u32, replicates: u32) -> Sampler {

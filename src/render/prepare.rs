@@ -13,7 +13,7 @@ use super::material::PreparedMaterial;
 use super::medium::Medium;
 use super::pilot;
 use super::range;
-use super::reuse;
+use super::reuse::BlockSize;
 use super::techniques::Techniques;
 use crate::accel::Ray;
 use crate::light::{EmissiveTriangle, EnvironmentLight, EnvironmentTables, Lights, Partner};
@@ -56,7 +56,7 @@ pub struct Prepared {
     pub(super) all_opaque: bool,
     pub(super) techniques: Techniques,
     /// Neighbouring pixels use each other's paths, or why not.
-    pub(super) path_reuse: Result<(), String>,
+    pub(super) path_reuse: Result<BlockSize, String>,
 }
 
 impl Prepared {
@@ -160,10 +160,15 @@ impl Prepared {
         self.path_reuse.is_ok()
     }
 
+    /// Columns and rows of the blocks whose pixels use each other's paths, if they do.
+    pub fn reuse_block(&self) -> Option<(u32, u32)> {
+        self.path_reuse.as_ref().ok().map(|block| block.sides())
+    }
+
     /// How many times as good camera paths are as light paths take them to be: each is used by all pixels of its block.
     #[inline]
     pub(super) fn camera_weight(&self) -> f32 {
-        if self.path_reuse.is_ok() { reuse::BLOCK as f32 } else { 1.0 }
+        self.path_reuse.as_ref().map_or(1.0, |block| block.pixels() as f32)
     }
 
     /// Columns and rows of the image.

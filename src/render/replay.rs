@@ -3,7 +3,7 @@
 use super::Prepared;
 use super::film::{camera_sample, sample_pixel};
 use super::path::Walk;
-use super::reuse::{self, gather};
+use super::reuse::{block_around, gather};
 use crate::color::Rgb;
 
 /// One vertex of a replayed path.
@@ -30,13 +30,13 @@ pub struct Replay {
 /// Traces sample `sample` of pixel (x, y) again and tells where it went.
 pub fn replay(scene: &Prepared, x: u32, y: u32, sample: u32) -> Replay {
     let mut vertices = Vec::new();
-    if scene.path_reuse.is_err() {
+    let Ok(size) = &scene.path_reuse else {
         let path = sample_pixel(scene, x, y, sample, |v| vertices.push(v));
         return Replay { radiance: path.radiance, vertices };
-    }
+    };
     let mut own = 0;
     let mut block = Vec::new();
-    for place in reuse::block_around((x, y), reuse::SIDES, scene.size()) {
+    for place in block_around((x, y), size.sides(), scene.size()) {
         let (sampler, ray) = camera_sample(scene, place.0, place.1, sample);
         let mut walk = Walk::shared(scene, ray);
         if place == (x, y) {
@@ -47,5 +47,11 @@ pub fn replay(scene: &Prepared, x: u32, y: u32, sample: u32) -> Replay {
         }
         block.push(walk);
     }
-    Replay { radiance: gather(scene, &block)[own].radiance, vertices }
+    let mut radiance = Rgb::BLACK;
+    gather(scene, &block, |(place, path)| {
+        if place == own {
+            radiance = path.radiance;
+        }
+    });
+    Replay { radiance, vertices }
 }

@@ -31,10 +31,35 @@ use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::light::LightSample;
 
-/// The columns and rows of a block: tiles are made of whole ones.
-pub(super) const SIDES: (u32, u32) = (2, 2);
-/// Its pixels.
-pub(super) const BLOCK: usize = (SIDES.0 * SIDES.1) as usize;
+/// The pixels of a block: tiles are made of whole ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum BlockSize {
+    /// Two columns of two.
+    Four,
+    /// Four columns of two: less noise still where neighbours see alike, for more rays.
+    Eight,
+}
+
+/// The most pixels of a block.
+pub(super) const MOST: usize = BlockSize::Eight.pixels() as usize;
+
+impl BlockSize {
+    /// All of them, in the order of their numbers.
+    pub(super) const ALL: [Self; 2] = [Self::Four, Self::Eight];
+
+    /// Columns and rows.
+    pub(super) const fn sides(self) -> (u32, u32) {
+        match self {
+            Self::Four => (2, 2),
+            Self::Eight => (4, 2),
+        }
+    }
+
+    pub(super) const fn pixels(self) -> u32 {
+        let (columns, rows) = self.sides();
+        columns * rows
+    }
+}
 
 /// The pixels of the block of so many columns and rows that one is in, row by row, where the picture ends before the column and row `end`.
 pub(super) fn block_around(
@@ -205,23 +230,33 @@ impl Walk {
     }
 }
 
-/// What each path of a block found by itself and by joining the others, by its place in the block.
-pub(super) fn gather(scene: &Prepared, block: &[Walk]) -> [PathSample; BLOCK] {
+/// Gives what each path of a block found by itself and by joining the others, with its place in the block.
+#[inline]
+pub(super) fn gather(scene: &Prepared, block: &[Walk], found: impl FnMut((usize, &PathSample))) {
+    // Few paths in arrays for many would be slow.
+    match block.len() {
+        0 | 1 => gathered::<1>(scene, block).iter().take(block.len()).enumerate().for_each(found),
+        2..=4 => gathered::<4>(scene, block).iter().take(block.len()).enumerate().for_each(found),
+        _ => gathered::<MOST>(scene, block).iter().take(block.len()).enumerate().for_each(found),
+    }
+}
+
+fn gathered<const PIXELS: usize>(scene: &Prepared, block: &[Walk]) -> [PathSample; PIXELS] {
     // Written where they stay: samples handed on would be copied several times, each waiting for the last.
-    let mut samples = [PathSample::default(); BLOCK];
+    let mut samples = [PathSample::default(); PIXELS];
     for (sample, walk) in samples.iter_mut().zip(block) {
         *sample = walk.path();
     }
     if !block.iter().any(Walk::is_lit_beyond) {
         return samples;
     }
-    let firsts: [Option<Surface<'_>>; BLOCK] = std::array::from_fn(|i| {
+    let firsts: [Option<Surface<'_>>; PIXELS] = std::array::from_fn(|i| {
         let met = block.get(i)?.trail.first.as_ref()?;
         Some(Surface::new(scene, &met.ray, &met.hit))
     });
-    let mut varying = [None; BLOCK];
+    let mut varying = [None; PIXELS];
     let mut varying = varying.iter_mut();
-    let viewers: [Option<Viewer<'_>>; BLOCK] = std::array::from_fn(|i| {
+    let viewers: [Option<Viewer<'_>>; PIXELS] = std::array::from_fn(|i| {
         let (surface, varying) = (firsts[i].as_ref()?, varying.next()?);
         let shading = surface.shading(scene, varying)?;
         let mut from_light = FromLight::CAMERA;
@@ -235,12 +270,12 @@ pub(super) fn gather(scene: &Prepared, block: &[Walk]) -> [PathSample; BLOCK] {
 }
 
 /// Joins the viewers to the second surface of `walk`, the path of the viewer `own`.
-fn join(
+fn join<const PIXELS: usize>(
     scene: &Prepared,
-    viewers: &[Option<Viewer<'_>>; BLOCK],
+    viewers: &[Option<Viewer<'_>>; PIXELS],
     own: usize,
     walk: &Walk,
-    samples: &mut [PathSample; BLOCK],
+    samples: &mut [PathSample; PIXELS],
 ) {
     let trail = &walk.trail;
     let (direct, onward) = (&trail.direct, walk.lit_onward());
@@ -253,7 +288,7 @@ fn join(
     let is_alone = !is_usual(own_view.density);
     let own_view = if is_alone { View { f: trail.weight, density: 1.0, ..own_view } } else { own_view };
     let mut own_view = Some(own_view);
-    let views: [Option<View<'_>>; BLOCK] = std::array::from_fn(|pixel| match &viewers[pixel] {
+    let views: [Option<View<'_>>; PIXELS] = std::array::from_fn(|pixel| match &viewers[pixel] {
         _ if pixel == own => own_view.take(),
         Some(viewer) if !is_alone => viewer.view(scene, pixel, &second, &shading, &mut samples[pixel].rays),
         _ => None,
@@ -261,7 +296,7 @@ fn join(
     let seen = |wi: Vec3, of_own: (Rgb, f32)| {
         // Light paths come to all viewers from the same side.
         let back = if scene.light_paths.is_ok() { second.shading_from(scene, &shading, wi) } else { None };
-        std::array::from_fn::<_, BLOCK, _>(|pixel| {
+        std::array::from_fn::<_, PIXELS, _>(|pixel| {
             let view = views[pixel].as_ref()?;
             let reflected = if pixel == own { of_own } else { second.reflected(&view.shading, wi) };
             view.seen(&second, wi, reflected, back)

@@ -21,7 +21,7 @@ pub(super) const NAMED_BAD_SAMPLES: usize = 16;
 const FEWEST_JUDGED: u32 = 16;
 
 /// The places of pixels that are sampled together.
-pub(super) type Block = SmallVec<[(u32, u32); reuse::BLOCK]>;
+pub(super) type Block = SmallVec<[(u32, u32); reuse::MOST]>;
 
 /// One pixel's result: means over all its samples, where a sample that hits nothing has albedo and normal 0; the depth is the mean
 /// over those that hit something.

@@ -40,8 +40,8 @@ impl<'a> Variants<'a> {
     /// Takes in as many of `scenes` as follow the first one and are variants of it.
     ///
     /// None of the materials that differ may emit light or let shadow rays pass, and everything else must be the same: geometry,
-    /// textures, lights, camera and settings; light paths start in all or none. There are at most 16, and at most as many as two
-    /// gigabytes hold the pixels of.
+    /// textures, lights, camera and settings; light paths start in all or none, and pixels share paths in blocks of the same size. There are
+    /// at most 16, and at most as many as two gigabytes hold the pixels of.
     pub fn leading(scenes: impl IntoIterator<Item = &'a Prepared>) -> Option<Self> {
         let mut scenes = scenes.into_iter();
         let mut variants = Self::alone(scenes.next()?);
@@ -93,7 +93,7 @@ impl<'a> Variants<'a> {
 
     /// The columns and rows of the blocks whose pixels are sampled together.
     pub(super) fn block_sides(&self) -> (u32, u32) {
-        if self.scenes[0].path_reuse.is_ok() { reuse::SIDES } else { (1, 1) }
+        self.scenes[0].path_reuse.as_ref().map_or((1, 1), |block| block.sides())
     }
 
     /// Takes a sample of each pixel of a block of the variants that are `going` on, at least one, and gives each one's to `found`, with the
@@ -150,9 +150,9 @@ impl<'a> Variants<'a> {
     ) {
         let first = self.scenes[going[0]];
         let are_several = going.len() > 1;
-        let starts: SmallVec<[(Sampler, Ray); reuse::BLOCK]> =
+        let starts: SmallVec<[(Sampler, Ray); reuse::MOST]> =
             block.iter().map(|&(x, y)| camera_sample(first, x, y, sample)).collect();
-        let seen: SmallVec<[Option<Hit>; reuse::BLOCK]> =
+        let seen: SmallVec<[Option<Hit>; reuse::MOST]> =
             starts.iter().map(|(sampler, ray)| first_surface(first, sampler, ray)).collect();
         if seen.iter().all(Option::is_none) {
             // No paths to be joined, nor to be made for that.
@@ -165,36 +165,31 @@ impl<'a> Variants<'a> {
             return;
         }
         // Collected, not pushed: so they are made where they stay.
-        let mut walks: SmallVec<[Walk; reuse::BLOCK]> =
+        let mut walks: SmallVec<[Walk; reuse::MOST]> =
             starts.iter().map(|&(_, ray)| Walk::shared(first, ray)).collect();
         let stops = |hit: &Hit| are_several && self.differs(hit);
-        let stopped: SmallVec<[Option<Hit>; reuse::BLOCK]> = walks
+        let stopped: SmallVec<[Option<Hit>; reuse::MOST]> = walks
             .iter_mut()
             .zip(&starts)
             .zip(&seen)
             .map(|((walk, (sampler, _)), &seen)| walk.go_on_from_first(first, sampler, seen, stops))
             .collect();
         if stopped.iter().all(Option::is_none) {
-            let samples = gather(first, &walks);
-            for &variant in going {
-                for (pixel, path) in samples.iter().enumerate().take(block.len()) {
+            return gather(first, &walks, |(pixel, path)| {
+                for &variant in going {
                     found(variant, pixel, path, if are_several { path.rays } else { 0 });
                 }
-            }
-            return;
+            });
         }
         for &variant in going {
             let scene = self.scenes[variant];
-            let finished: SmallVec<[Walk; reuse::BLOCK]> = walks
+            let finished: SmallVec<[Walk; reuse::MOST]> = walks
                 .iter()
                 .zip(&starts)
                 .zip(&stopped)
                 .map(|((walk, (sampler, _)), met)| walk.finished(scene, sampler, *met))
                 .collect();
-            let samples = gather(scene, &finished);
-            for (pixel, (path, walk)) in samples.iter().zip(&walks).enumerate() {
-                found(variant, pixel, path, walk.path().rays);
-            }
+            gather(scene, &finished, |(pixel, path)| found(variant, pixel, path, walks[pixel].path().rays));
         }
     }
 
@@ -214,7 +209,7 @@ fn differ_in_materials_alone(a: &Prepared, b: &Prepared) -> bool {
         && a.settings.integrator == Integrator::Path
         && a.techniques == b.techniques
         && a.light_paths.is_ok() == b.light_paths.is_ok()
-        && a.path_reuse.is_ok() == b.path_reuse.is_ok()
+        && a.path_reuse.as_ref().ok() == b.path_reuse.as_ref().ok()
         && a.camera_medium == b.camera_medium
         && from.materials.len() == to.materials.len()
         && from.instances == to.instances
