@@ -48,8 +48,9 @@ const LOOKS_PER_MEETING: u32 = 16;
 const JOINABLE_COST: f64 = 1.0;
 const JOINING_COST: f64 = 0.85;
 /// Light paths, and blocks of eight instead of four, have to leave no more than this of the work, or they are not used: the ones take memory,
-/// the others make noise blotchier, and jobs of a sweep that do the same share more.
+/// the others make noise blotchier, both take time, and jobs of a sweep that do the same share more.
 const LEAST_GAIN: f64 = 0.92;
+const LEAST_GAIN_OF_LARGE: f64 = 0.87;
 /// The noise that evenly spread points leave of what independent ones make, in the part of a path's light that its neighbours have no use for:
 /// emission and light sampled at the first surface. In the rest they are little better. Measured: from 0.2 on the shader ball to 1 on the statue.
 const SPREAD: f64 = 1.0 / 3.0;
@@ -122,9 +123,9 @@ impl Worth {
     /// Error times cost, and more for what has to save some.
     fn work(&self, used: Used) -> f64 {
         let (error, cost) = self.of(used);
-        let handicap = |is_used: bool| if is_used { 1.0 / LEAST_GAIN } else { 1.0 };
-        let (light_paths, large) = (used.light_paths, used.path_reuse == Some(BlockSize::Eight));
-        error * cost * handicap(light_paths) * handicap(large)
+        let of_lights = if used.light_paths { LEAST_GAIN } else { 1.0 };
+        let of_size = if used.path_reuse == Some(BlockSize::Eight) { LEAST_GAIN_OF_LARGE } else { 1.0 };
+        error * cost / (of_lights * of_size)
     }
 
     /// What a technique that `with` has and `without` has not would bring.
