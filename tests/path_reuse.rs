@@ -144,7 +144,7 @@ fn mirrors() -> Scene {
 #[test]
 fn blocks_are_as_large_as_neighbours_see_alike() {
     for seed in 0..8 {
-        let settings = RenderSettings { seed, ..small(80, 60, 1 << (seed % 4), 6) };
+        let settings = RenderSettings { seed, ..small(240, 180, 1 << (seed % 4), 6) };
         assert_eq!(prepared(&dull(), &settings).reuse_block(), Some(LARGE), "{seed}");
         assert_eq!(prepared(&mirrors(), &settings).reuse_block(), None, "{seed}");
     }
