@@ -235,8 +235,7 @@ impl Walk {
 pub(super) fn gather(scene: &Prepared, block: &[Walk], found: impl FnMut((usize, &PathSample))) {
     // Few paths in arrays for many would be slow.
     match block.len() {
-        0 | 1 => gathered::<1>(scene, block).iter().take(block.len()).enumerate().for_each(found),
-        2..=4 => gathered::<4>(scene, block).iter().take(block.len()).enumerate().for_each(found),
+        0..=4 => gathered::<4>(scene, block).iter().take(block.len()).enumerate().for_each(found),
         _ => gathered::<MOST>(scene, block).iter().take(block.len()).enumerate().for_each(found),
     }
 }
@@ -250,19 +249,23 @@ fn gathered<const PIXELS: usize>(scene: &Prepared, block: &[Walk]) -> [PathSampl
     if !block.iter().any(Walk::is_lit_beyond) {
         return samples;
     }
-    let firsts: [Option<Surface<'_>>; PIXELS] = std::array::from_fn(|i| {
-        let met = block.get(i)?.trail.first.as_ref()?;
-        Some(Surface::new(scene, &met.ray, &met.hit))
-    });
+    let mut firsts: [Option<Surface<'_>>; PIXELS] = [const { None }; PIXELS];
+    for (first, walk) in firsts.iter_mut().zip(block) {
+        *first = walk.trail.first.as_ref().map(|met| Surface::new(scene, &met.ray, &met.hit));
+    }
     let mut varying = [None; PIXELS];
-    let mut varying = varying.iter_mut();
-    let viewers: [Option<Viewer<'_>>; PIXELS] = std::array::from_fn(|i| {
-        let (surface, varying) = (firsts[i].as_ref()?, varying.next()?);
-        let shading = surface.shading(scene, varying)?;
-        let mut from_light = FromLight::CAMERA;
-        from_light.arrive(scene, &block[i].trail.first?.ray, surface);
-        Some(Viewer { surface, shading, from_light })
-    });
+    let mut viewers: [Option<Viewer<'_>>; PIXELS] = [const { None }; PIXELS];
+    for ((viewer, walk), (first, varying)) in
+        viewers.iter_mut().zip(block).zip(firsts.iter().zip(&mut varying))
+    {
+        if let (Some(surface), Some(met)) = (first, &walk.trail.first) {
+            *viewer = surface.shading(scene, varying).map(|shading| {
+                let mut from_light = FromLight::CAMERA;
+                from_light.arrive(scene, &met.ray, surface);
+                Viewer { surface, shading, from_light }
+            });
+        }
+    }
     for (own, walk) in block.iter().enumerate() {
         join(scene, &viewers, own, walk, &mut samples);
     }
@@ -287,20 +290,28 @@ fn join<const PIXELS: usize>(
     let own_view = viewer.own_view(scene, own, trail, &second, shading);
     let is_alone = !is_usual(own_view.density);
     let own_view = if is_alone { View { f: trail.weight, density: 1.0, ..own_view } } else { own_view };
-    let mut own_view = Some(own_view);
-    let views: [Option<View<'_>>; PIXELS] = std::array::from_fn(|pixel| match &viewers[pixel] {
-        _ if pixel == own => own_view.take(),
-        Some(viewer) if !is_alone => viewer.view(scene, pixel, &second, &shading, &mut samples[pixel].rays),
-        _ => None,
-    });
+    let mut views: [Option<View<'_>>; PIXELS] = [const { None }; PIXELS];
+    if !is_alone {
+        for (pixel, (view, viewer)) in views.iter_mut().zip(viewers).enumerate() {
+            if let Some(viewer) = viewer
+                && pixel != own
+            {
+                *view = viewer.view(scene, pixel, &second, &shading, &mut samples[pixel].rays);
+            }
+        }
+    }
+    views[own] = Some(own_view);
     let seen = |wi: Vec3, of_own: (Rgb, f32)| {
         // Light paths come to all viewers from the same side.
         let back = if scene.light_paths.is_ok() { second.shading_from(scene, &shading, wi) } else { None };
-        std::array::from_fn::<_, PIXELS, _>(|pixel| {
-            let view = views[pixel].as_ref()?;
-            let reflected = if pixel == own { of_own } else { second.reflected(&view.shading, wi) };
-            view.seen(&second, wi, reflected, back)
-        })
+        let mut all: [Option<Seen<'_, '_>>; PIXELS] = [const { None }; PIXELS];
+        for (seen, view) in all.iter_mut().zip(&views) {
+            if let Some(view) = view {
+                let reflected = if view.pixel == own { of_own } else { second.reflected(&view.shading, wi) };
+                *seen = view.seen(&second, wi, reflected, back);
+            }
+        }
+        all
     };
     let strategies = Strategies::of(scene);
     if let Some(direct) = direct {

@@ -12,7 +12,7 @@ use super::Prepared;
 use super::film::{camera_sample, sample_pixel};
 use super::light_image;
 use super::path::{PathSample, Walk, first_surface};
-use super::reuse::{self, gather};
+use super::reuse::{BlockSize, gather};
 use super::tile;
 use crate::accel::{Hit, Ray};
 use crate::math::sobol::Sampler;
@@ -106,8 +106,10 @@ impl<'a> Variants<'a> {
         sample: u32,
         mut found: impl FnMut(usize, usize, &PathSample, u64),
     ) {
-        if self.scenes[going[0]].path_reuse.is_ok() {
-            return self.sample_block(going, block, sample, found);
+        match self.scenes[going[0]].path_reuse {
+            Ok(BlockSize::Four) => return self.sample_block::<4>(going, block, sample, found),
+            Ok(BlockSize::Eight) => return self.sample_block::<8>(going, block, sample, found),
+            Err(_) => (),
         }
         for (pixel, &place) in block.iter().enumerate() {
             self.sample_pixel(going, place, sample, |variant, path, shared| {
@@ -141,7 +143,7 @@ impl<'a> Variants<'a> {
     }
 
     /// The pixels join each other's paths ([`super::reuse`]).
-    fn sample_block(
+    fn sample_block<const PIXELS: usize>(
         &self,
         going: &[usize],
         block: &[(u32, u32)],
@@ -150,9 +152,9 @@ impl<'a> Variants<'a> {
     ) {
         let first = self.scenes[going[0]];
         let are_several = going.len() > 1;
-        let starts: SmallVec<[(Sampler, Ray); reuse::MOST]> =
+        let starts: SmallVec<[(Sampler, Ray); PIXELS]> =
             block.iter().map(|&(x, y)| camera_sample(first, x, y, sample)).collect();
-        let seen: SmallVec<[Option<Hit>; reuse::MOST]> =
+        let seen: SmallVec<[Option<Hit>; PIXELS]> =
             starts.iter().map(|(sampler, ray)| first_surface(first, sampler, ray)).collect();
         if seen.iter().all(Option::is_none) {
             // No paths to be joined, nor to be made for that.
@@ -165,10 +167,10 @@ impl<'a> Variants<'a> {
             return;
         }
         // Collected, not pushed: so they are made where they stay.
-        let mut walks: SmallVec<[Walk; reuse::MOST]> =
+        let mut walks: SmallVec<[Walk; PIXELS]> =
             starts.iter().map(|&(_, ray)| Walk::shared(first, ray)).collect();
         let stops = |hit: &Hit| are_several && self.differs(hit);
-        let stopped: SmallVec<[Option<Hit>; reuse::MOST]> = walks
+        let stopped: SmallVec<[Option<Hit>; PIXELS]> = walks
             .iter_mut()
             .zip(&starts)
             .zip(&seen)
@@ -183,7 +185,7 @@ impl<'a> Variants<'a> {
         }
         for &variant in going {
             let scene = self.scenes[variant];
-            let finished: SmallVec<[Walk; reuse::MOST]> = walks
+            let finished: SmallVec<[Walk; PIXELS]> = walks
                 .iter()
                 .zip(&starts)
                 .zip(&stopped)
