@@ -87,7 +87,8 @@ pub fn render_together(
                 lit.sample_up_to(scene, samples, control)?;
             }
         }
-        stacks.par_iter_mut().try_for_each(|stack| {
+        // One by one: rayon would leave a run of tiles to one thread while the others are done.
+        stacks.par_iter_mut().with_max_len(1).try_for_each(|stack| {
             let ends = is_late() && stack.iter().all(|tile| tile.samples > 0);
             if ends { Ok(()) } else { sample_up_to(variants, stack, samples, &lit, control) }
         })?;

@@ -86,6 +86,7 @@ impl LightImage {
             let starts: Vec<u64> = (self.paths..end).step_by(BATCH as usize).collect();
             let batches: Vec<Batch> = starts
                 .into_par_iter()
+                .with_max_len(1)
                 .map(|start| {
                     let batch = start..end.min(start + BATCH);
                     control.paths.fetch_add(batch.end - batch.start, Ordering::Relaxed);
