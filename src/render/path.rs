@@ -137,14 +137,9 @@ impl Walk {
             let hit = match met.take() {
                 Some(hit) => hit,
                 None => {
-                    self.vertices += 1;
-                    self.path.rays += 1;
-                    let Some(hit) =
-                        next_surface(scene, sampler, self.vertices, &self.ray, self.ray.direction)
-                    else {
-                        self.leave_scene(scene);
-                        break;
-                    };
+                    let hit = next_surface(scene, sampler, self.vertices + 1, &self.ray, self.ray.direction);
+                    self.arrive(scene, hit.as_ref());
+                    let Some(hit) = hit else { break };
                     if stops(&hit) {
                         return Some(hit);
                     }
@@ -162,7 +157,7 @@ impl Walk {
     #[inline]
     pub(super) fn of_background(scene: &Prepared, camera_ray: Ray) -> PathSample {
         let mut walk = Self::new(scene, camera_ray);
-        walk.begin(scene, None);
+        walk.arrive(scene, None);
         walk.path
     }
 
@@ -175,18 +170,19 @@ impl Walk {
         first: Option<Hit>,
         stops: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
-        self.begin(scene, first.as_ref());
+        self.arrive(scene, first.as_ref());
         match first {
             Some(hit) if !stops(&hit) => self.go_on(scene, sampler, Some(hit), stops, |_| ()),
             stopped => stopped,
         }
     }
 
-    /// Its first ray was traced, and met a surface or none.
+    /// Its ray was traced, and met a surface or none.
     #[inline(always)]
-    fn begin(&mut self, scene: &Prepared, first: Option<&Hit>) {
-        (self.vertices, self.path.rays) = (1, 1);
-        if first.is_none() {
+    fn arrive(&mut self, scene: &Prepared, hit: Option<&Hit>) {
+        self.vertices += 1;
+        self.path.rays += 1;
+        if hit.is_none() {
             self.leave_scene(scene);
         }
     }
