@@ -60,6 +60,10 @@ pub struct RenderSettings {
     /// of two by two pixels then, or of four by two where neighbours see alike.
     #[serde(skip_serializing_if = "is_default")]
     pub path_reuse: Use,
+    /// Let two paths go on from the first surface of each sample, instead of one: less noise of what surfaces reflect for less than twice the
+    /// time, where finding those surfaces is most of the work.
+    #[serde(skip_serializing_if = "is_default")]
+    pub splitting: Use,
 }
 
 /// Whether a technique is used.
@@ -211,6 +215,7 @@ impl Default for RenderSettings {
             mis: true,
             light_paths: Use::Auto,
             path_reuse: Use::Auto,
+            splitting: Use::Auto,
         }
     }
 }

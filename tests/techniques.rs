@@ -16,6 +16,7 @@ const ALL: Techniques = Techniques {
     roulette: true,
     light_paths: true,
     path_reuse: true,
+    splitting: true,
     constants: true,
     coverage: true,
     useful_light: true,
@@ -32,7 +33,8 @@ fn scene(name: &str) -> LoadedScene {
 fn prepared(scene: &LoadedScene, spp: u32) -> Prepared {
     let light_paths = Use::Always;
     let size = RenderSettings { width: Some(32), height: Some(24), ..RenderSettings::default() };
-    let settings = RenderSettings { spp, light_paths, path_reuse: Use::Always, ..size };
+    let settings =
+        RenderSettings { spp, light_paths, path_reuse: Use::Always, splitting: Use::Always, ..size };
     Prepared::new(Arc::clone(&scene.scene), Arc::clone(&scene.geometry), &settings).expect("prepared")
 }
 
@@ -90,6 +92,7 @@ fn what_is_left_out_is_not_done() {
     assert!(rays(Techniques { useful_light: false, ..ALL }) > rays(ALL));
     assert!(rays(Techniques { roulette: false, ..ALL }) > rays(ALL));
     assert!(rays(Techniques { light_paths: false, ..ALL }) < rays(ALL));
+    assert!(rays(Techniques { splitting: false, ..ALL }) < rays(ALL));
 }
 
 /// The mean of all values of the picture with the variance of that mean, or more, which the data part tells.
@@ -118,6 +121,7 @@ fn without_what_lessens_noise_the_expectation_is_the_same() {
             Techniques { roulette: false, ..ALL },
             Techniques { light_paths: false, ..ALL },
             Techniques { path_reuse: false, ..ALL },
+            Techniques { splitting: false, ..ALL },
         ] {
             let without = rendered(&prepared(&scene, 256).with(techniques));
             // The box has no material of two lobes, and the other's cut-outs keep paths from being reused.

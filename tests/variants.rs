@@ -145,6 +145,25 @@ fn variants_that_reuse_paths_have_the_bits_that_each_has_alone() {
     }
 }
 
+/// With neighbours' paths, which the veil forbids, and without; and with all pixels that see the sky alone.
+#[test]
+fn branches_are_shared_to_the_same_bits() {
+    for (is_veiled, path_reuse) in [(true, Use::Never), (false, Use::Always)] {
+        let mut looks = looks();
+        if !is_veiled {
+            looks.iter_mut().for_each(|world| world.materials[VEIL].item.opacity = Opacity::default());
+        }
+        for (light_paths, error) in [(Use::Never, None), (Use::Always, None), (Use::Never, Some(0.02))] {
+            let settings =
+                RenderSettings { splitting: Use::Always, path_reuse, error, ..settings(light_paths) };
+            let scenes = prepared(&looks, &[settings]);
+            assert!(scenes.iter().all(|scene| scene.has_splitting()));
+            assert_eq!(scenes.iter().all(Prepared::has_path_reuse), !is_veiled);
+            assert_the_same(&scenes);
+        }
+    }
+}
+
 #[test]
 fn each_variant_ends_where_its_own_error_is_reached() {
     let settings = RenderSettings { error: Some(0.004), spp: 256, ..settings(Use::Never) };

@@ -320,11 +320,18 @@ fn tell_path(prepared: &Prepared, planned: &PlannedJob, x: u32, y: u32, sample: 
     }
     let path = replay(prepared, x, y, sample);
     let mut text = String::new();
-    for (i, v) in path.vertices.iter().enumerate() {
-        let [px, py, pz] = v.point;
-        let (beta, radiance) = (v.beta.to_array(), v.radiance.to_array());
-        text +=
-            &format!("{:>3}  at ({px}, {py}, {pz})  beta {beta:?}  radiance so far {radiance:?}\n", i + 1);
+    for (branch, vertices) in path.branches.iter().enumerate() {
+        if path.branches.len() > 1 {
+            text += &format!("branch {} of {}\n", branch + 1, path.branches.len());
+        }
+        for (i, v) in vertices.iter().enumerate() {
+            let [px, py, pz] = v.point;
+            let (beta, radiance) = (v.beta.to_array(), v.radiance.to_array());
+            text += &format!(
+                "{:>3}  at ({px}, {py}, {pz})  beta {beta:?}  radiance so far {radiance:?}\n",
+                i + 1
+            );
+        }
     }
     let joined = if prepared.has_path_reuse() { ", with what neighbours' paths bring" } else { "" };
     let lit = if prepared.has_light_paths() { ", without what light paths bring" } else { "" };

@@ -145,6 +145,20 @@ impl Sampler {
         Self { reversed_index: index.reverse_bits(), ..square }
     }
 
+    /// Branch 0 or 1 of two: those of all samples of a replicate are consecutive parts of one sequence of twice as many.
+    #[inline]
+    #[must_use]
+    pub fn branch(self, branch: u32) -> Self {
+        Self { reversed_index: self.reversed_index >> 1 | branch << 31, ..self }
+    }
+
+    /// The same of branches that know nothing of each other.
+    #[inline]
+    #[must_use]
+    pub fn independent_branch(self, branch: u32) -> Self {
+        Self { key: combine(self.key, u64::from(branch)), ..self }
+    }
+
     /// Four numbers in [0, 1) that are well distributed over the samples of a replicate, independent of all other sets.
     #[inline]
     pub fn set(&self, vertex: u32, purpose: Purpose) -> [f32; 4] {
@@ -216,6 +230,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// As evenly as twice as many samples, in each replicate.
+    #[test]
+    fn branches_of_a_pixels_samples_complete_each_other() {
+        for (seed, replicates) in (0..20).flat_map(|seed| [1, 2].map(|replicates| (seed, replicates))) {
+            let samples = (0..8 * replicates).filter(|sample| sample % replicates == 0);
+            let samples = samples.map(|i| Sampler::in_square(seed, (5, 6), i, 8 * replicates, replicates));
+            let branches = samples.flat_map(|sampler| [sampler.branch(0), sampler.branch(1)]);
+            let points: Vec<_> = branches.map(|branch| branch.set(1, Purpose::Bsdf)).collect();
+            for d in 0..4 {
+                let mut places: Vec<u32> = points.iter().map(|p| (p[d] * 16.0) as u32).collect();
+                places.sort_unstable();
+                assert_eq!(places, Vec::from_iter(0..16), "seed {seed}, dimension {d}");
+            }
+        }
+    }
+
+    #[test]
+    fn branches_that_know_nothing_of_each_other_are_unlike() {
+        let sampler = Sampler::new(3, 1, 2, 0, 4);
+        let sets = [0, 1].map(|branch| sampler.independent_branch(branch).set(1, Purpose::Bsdf));
+        assert!((0..4).all(|d| sets[0][d] != sets[1][d]), "{sets:?}");
     }
 
     #[test]

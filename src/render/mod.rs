@@ -25,6 +25,7 @@ mod replay;
 mod reuse;
 mod sharing;
 mod skipped;
+mod splitting;
 mod surface;
 mod techniques;
 mod tile;

@@ -169,10 +169,11 @@ impl Walk {
         sampler: &Sampler,
         first: Option<Hit>,
         stops: impl Fn(&Hit) -> bool,
+        inspect: impl FnMut(ReplayVertex),
     ) -> Option<Hit> {
         self.arrive(scene, first.as_ref());
         match first {
-            Some(hit) if !stops(&hit) => self.go_on(scene, sampler, Some(hit), stops, |_| ()),
+            Some(hit) if !stops(&hit) => self.go_on(scene, sampler, Some(hit), stops, inspect),
             stopped => stopped,
         }
     }

@@ -14,6 +14,7 @@ use super::medium::Medium;
 use super::pilot;
 use super::range;
 use super::reuse::BlockSize;
+use super::splitting::BRANCHES;
 use super::techniques::Techniques;
 use crate::accel::Ray;
 use crate::light::{EmissiveTriangle, EnvironmentLight, EnvironmentTables, Lights, Partner};
@@ -57,6 +58,8 @@ pub struct Prepared {
     pub(super) techniques: Techniques,
     /// Neighbouring pixels use each other's paths, or why not.
     pub(super) path_reuse: Result<BlockSize, String>,
+    /// Samples branch at their first surface, or why they don't.
+    pub(super) splitting: Result<(), String>,
 }
 
 impl Prepared {
@@ -117,14 +120,17 @@ impl Prepared {
             all_opaque,
             techniques: Techniques::default(),
             path_reuse: Err(String::new()),
+            splitting: Err(String::new()),
             scene,
             geometry,
         };
         prepared.camera_medium = prepared.medium_around(&prepared.camera.axis_ray());
         let path_reuse = path_reuse(settings, all_opaque);
-        let choice = pilot::choose(&prepared, path_reuse.is_ok());
+        let splitting = splitting(settings);
+        let choice = pilot::choose(&prepared, path_reuse.is_ok(), splitting.is_ok());
         prepared.light_paths = prepared.light_paths.and_then(|plan| choice.light_paths.map(|()| plan));
         prepared.path_reuse = path_reuse.and(choice.path_reuse);
+        prepared.splitting = splitting.and(choice.splitting);
         Ok(prepared)
     }
 
@@ -143,6 +149,9 @@ impl Prepared {
         }
         if !techniques.path_reuse {
             self.path_reuse = Err("left out".to_owned());
+        }
+        if !techniques.splitting {
+            self.splitting = Err("left out".to_owned());
         }
         self.all_covered &= techniques.coverage;
         self.all_opaque &= techniques.coverage;
@@ -165,10 +174,17 @@ impl Prepared {
         self.path_reuse.as_ref().ok().map(|block| block.sides())
     }
 
-    /// How many times as good camera paths are as light paths take them to be: each is used by all pixels of its block.
+    /// Samples branch at their first surface.
+    pub fn has_splitting(&self) -> bool {
+        self.splitting.is_ok()
+    }
+
+    /// How many times as good camera paths are as light paths take them to be: each is used by all pixels of its block, and each sample has
+    /// as many as it has branches.
     #[inline]
     pub(super) fn camera_weight(&self) -> f32 {
-        self.path_reuse.as_ref().map_or(1.0, |block| block.pixels() as f32)
+        let branches = if self.splitting.is_ok() { BRANCHES.len() as f32 } else { 1.0 };
+        self.path_reuse.as_ref().map_or(branches, |block| block.pixels() as f32 * branches)
     }
 
     /// Columns and rows of the image.
@@ -320,6 +336,19 @@ fn light_paths(
     match needed.into_iter().find(|(is_given, _)| !is_given) {
         Some((_, why)) => Err(why.to_owned()),
         None => Ok(LightPaths { per_sample: pixels.div_ceil(PIXELS_PER_PATH) }),
+    }
+}
+
+/// That samples may branch, or why not.
+fn splitting(settings: &RenderSettings) -> Result<(), String> {
+    let needed = [
+        (settings.splitting != Use::Never, "the settings ask for none"),
+        (settings.integrator == Integrator::Path, "no paths go on from the first surface"),
+        (settings.max_depth > 0, "no light is scattered"),
+    ];
+    match needed.into_iter().find(|(is_given, _)| !is_given) {
+        Some((_, why)) => Err(why.to_owned()),
+        None => Ok(()),
     }
 }
 

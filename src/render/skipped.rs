@@ -39,6 +39,9 @@ impl Prepared {
         if let Err(why) = &self.path_reuse {
             skipped.push(format!("reuse of paths by neighbouring pixels: {why}"));
         }
+        if let Err(why) = &self.splitting {
+            skipped.push(format!("branches of samples: {why}"));
+        }
         skipped.extend(self.absent_lights());
         skipped
     }

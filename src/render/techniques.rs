@@ -14,6 +14,8 @@ pub struct Techniques {
     pub light_paths: bool,
     /// Neighbouring pixels use each other's paths; without it each has its own.
     pub path_reuse: bool,
+    /// Samples branch at their first surface where that pays; without it none does.
+    pub splitting: bool,
     /// Saves work: what is the same all over a material is worked out once; without it at each point.
     pub constants: bool,
     /// Saves work: where all surfaces are opaque, rays ask no material whether it is there.
@@ -30,6 +32,7 @@ impl Default for Techniques {
             roulette: true,
             light_paths: true,
             path_reuse: true,
+            splitting: true,
             constants: true,
             coverage: true,
             useful_light: true,

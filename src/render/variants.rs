@@ -13,6 +13,7 @@ use super::film::{camera_sample, sample_pixel};
 use super::light_image;
 use super::path::{PathSample, Walk, first_surface};
 use super::reuse::{BlockSize, gather};
+use super::splitting::{BRANCHES, Joint, of_branch};
 use super::tile;
 use crate::accel::{Hit, Ray};
 use crate::math::sobol::Sampler;
@@ -40,7 +41,8 @@ impl<'a> Variants<'a> {
     /// Takes in as many of `scenes` as follow the first one and are variants of it.
     ///
     /// None of the materials that differ may emit light or let shadow rays pass, and everything else must be the same: geometry,
-    /// textures, lights, camera and settings; light paths start in all or none, and pixels share paths in blocks of the same size. There are
+    /// textures, lights, camera and settings; light paths start in all or none, pixels share paths in blocks of the same size, and samples branch in
+    /// all or none. There are
     /// at most 16, and at most as many as two gigabytes hold the pixels of.
     pub fn leading(scenes: impl IntoIterator<Item = &'a Prepared>) -> Option<Self> {
         let mut scenes = scenes.into_iter();
@@ -106,9 +108,13 @@ impl<'a> Variants<'a> {
         sample: u32,
         mut found: impl FnMut(usize, usize, &PathSample, u64),
     ) {
-        match self.scenes[going[0]].path_reuse {
+        let first = self.scenes[going[0]];
+        match first.path_reuse {
             Ok(BlockSize::Four) => return self.sample_block::<4>(going, block, sample, found),
             Ok(BlockSize::Eight) => return self.sample_block::<8>(going, block, sample, found),
+            Err(_) if first.splitting.is_ok() => {
+                return self.sample_block::<1>(going, block, sample, found);
+            }
             Err(_) => (),
         }
         for (pixel, &place) in block.iter().enumerate() {
@@ -142,7 +148,7 @@ impl<'a> Variants<'a> {
         }
     }
 
-    /// The pixels join each other's paths ([`super::reuse`]).
+    /// The pixels join each other's paths ([`super::reuse`]), or samples branch ([`super::splitting`]), or both.
     fn sample_block<const PIXELS: usize>(
         &self,
         going: &[usize],
@@ -166,15 +172,48 @@ impl<'a> Variants<'a> {
             }
             return;
         }
+        if first.splitting.is_err() {
+            return self.go_on_from::<PIXELS>(going, &starts, &seen, found);
+        }
+        let mut joint: SmallVec<[[Joint; PIXELS]; 1]> =
+            going.iter().map(|_| [Joint::default(); PIXELS]).collect();
+        for branch in BRANCHES {
+            let starts: SmallVec<[(Sampler, Ray); PIXELS]> =
+                starts.iter().map(|&(sampler, ray)| (of_branch(first, sampler, branch), ray)).collect();
+            self.go_on_from::<PIXELS>(going, &starts, &seen, |variant, pixel, path, shared_rays| {
+                if let Some(place) = going.iter().position(|&going| going == variant) {
+                    joint[place][pixel].add(path, shared_rays);
+                }
+            });
+        }
+        for (&variant, joint) in going.iter().zip(&joint) {
+            for (pixel, sample) in joint.iter().enumerate().take(block.len()) {
+                found(variant, pixel, &sample.path, sample.shared_rays);
+            }
+        }
+    }
+
+    /// Goes on with a block of paths whose first rays met what was `seen`.
+    fn go_on_from<const PIXELS: usize>(
+        &self,
+        going: &[usize],
+        starts: &[(Sampler, Ray)],
+        seen: &[Option<Hit>],
+        mut found: impl FnMut(usize, usize, &PathSample, u64),
+    ) {
+        let first = self.scenes[going[0]];
+        let are_several = going.len() > 1;
         // Collected, not pushed: so they are made where they stay.
-        let mut walks: SmallVec<[Walk; PIXELS]> =
-            starts.iter().map(|&(_, ray)| Walk::shared(first, ray)).collect();
+        let mut walks: SmallVec<[Walk; PIXELS]> = starts
+            .iter()
+            .map(|&(_, ray)| if PIXELS > 1 { Walk::shared(first, ray) } else { Walk::new(first, ray) })
+            .collect();
         let stops = |hit: &Hit| are_several && self.differs(hit);
         let stopped: SmallVec<[Option<Hit>; PIXELS]> = walks
             .iter_mut()
-            .zip(&starts)
-            .zip(&seen)
-            .map(|((walk, (sampler, _)), &seen)| walk.go_on_from_first(first, sampler, seen, stops))
+            .zip(starts)
+            .zip(seen)
+            .map(|((walk, (sampler, _)), &seen)| walk.go_on_from_first(first, sampler, seen, stops, |_| ()))
             .collect();
         if stopped.iter().all(Option::is_none) {
             return gather(first, &walks, |(pixel, path)| {
@@ -187,7 +226,7 @@ impl<'a> Variants<'a> {
             let scene = self.scenes[variant];
             let finished: SmallVec<[Walk; PIXELS]> = walks
                 .iter()
-                .zip(&starts)
+                .zip(starts)
                 .zip(&stopped)
                 .map(|((walk, (sampler, _)), met)| walk.finished(scene, sampler, *met))
                 .collect();
@@ -212,6 +251,7 @@ fn differ_in_materials_alone(a: &Prepared, b: &Prepared) -> bool {
         && a.techniques == b.techniques
         && a.light_paths.is_ok() == b.light_paths.is_ok()
         && a.path_reuse.as_ref().ok() == b.path_reuse.as_ref().ok()
+        && a.splitting.is_ok() == b.splitting.is_ok()
         && a.camera_medium == b.camera_medium
         && from.materials.len() == to.materials.len()
         && from.instances == to.instances

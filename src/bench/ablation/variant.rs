@@ -73,6 +73,11 @@ impl Variant {
                 Change::Without(|techniques| techniques.path_reuse = false),
             ),
             Self::new(
+                "no splitting",
+                "one path goes on from the first surface of each sample",
+                Change::Without(|techniques| techniques.splitting = false),
+            ),
+            Self::new(
                 "no roulette",
                 "paths go on to the greatest depth",
                 Change::Without(|techniques| techniques.roulette = false),

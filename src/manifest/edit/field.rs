@@ -152,6 +152,7 @@ fields! {
         Mis "mis": "true or false",
         LightPaths "light_paths": "one of \"auto\", \"always\", \"never\"",
         PathReuse "path_reuse": "one of \"auto\", \"always\", \"never\"",
+        Splitting "splitting": "one of \"auto\", \"always\", \"never\"",
     }
 }
 

@@ -40,6 +40,7 @@ pub(super) fn set(settings: &mut RenderSettings, field: RenderField, value: &Val
         RenderField::Mis => settings.mis = value::flag(value)?,
         RenderField::LightPaths => settings.light_paths = value::choice(value, Use::from_name)?,
         RenderField::PathReuse => settings.path_reuse = value::choice(value, Use::from_name)?,
+        RenderField::Splitting => settings.splitting = value::choice(value, Use::from_name)?,
     }
     Ok(())
 }

@@ -70,6 +70,7 @@ pub(in crate::manifest) const HOMES: &[(&str, &[&str])] = &[
             "mis",
             "light_paths",
             "path_reuse",
+            "splitting",
         ],
     ),
     ("[sheet]", &["columns", "rows", "cell_width"]),
