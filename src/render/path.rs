@@ -60,9 +60,20 @@ pub(super) fn trace(
     camera_ray: Ray,
     inspect: impl FnMut(ReplayVertex),
 ) -> PathSample {
+    let Some(first) = first_surface(scene, sampler, &camera_ray) else {
+        return background(scene, &camera_ray);
+    };
     let mut walk = Walk::new(scene, camera_ray);
-    walk.go_on(scene, sampler, None, |_| false, inspect);
+    walk.go_on_from_first(scene, sampler, Some(first), |_| false, inspect);
     walk.path()
+}
+
+/// What a path finds whose first ray meets no surface: nothing else finds what the camera sees at once.
+#[inline]
+pub(super) fn background(scene: &Prepared, camera_ray: &Ray) -> PathSample {
+    let passing = medium::transmittance(scene.camera_medium, f32::INFINITY);
+    let seen = scene.lights.environment(camera_ray.direction).map(|(radiance, _)| radiance * passing);
+    PathSample { radiance: seen.unwrap_or(Rgb::BLACK), first: None, rays: 1 }
 }
 
 /// A path under way, on the ray that its last surface sent out.
@@ -151,14 +162,6 @@ impl Walk {
             }
         }
         None
-    }
-
-    /// What a path finds whose first ray meets no surface.
-    #[inline]
-    pub(super) fn of_background(scene: &Prepared, camera_ray: Ray) -> PathSample {
-        let mut walk = Self::new(scene, camera_ray);
-        walk.arrive(scene, None);
-        walk.path
     }
 
     /// Goes on as below, where the first ray met what [`first_surface`] says.

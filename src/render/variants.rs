@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use super::Prepared;
 use super::film::{camera_sample, sample_pixel};
 use super::light_image;
-use super::path::{PathSample, Walk, first_surface};
+use super::path::{PathSample, Walk, background, first_surface};
 use super::reuse::{BlockSize, gather};
 use super::splitting::{BRANCHES, Joint, of_branch};
 use super::tile;
@@ -165,7 +165,7 @@ impl<'a> Variants<'a> {
         if seen.iter().all(Option::is_none) {
             // No paths to be joined, nor to be made for that.
             for (pixel, (_, ray)) in starts.iter().enumerate() {
-                let path = Walk::of_background(first, *ray);
+                let path = background(first, ray);
                 for &variant in going {
                     found(variant, pixel, &path, if are_several { path.rays } else { 0 });
                 }
