@@ -137,16 +137,21 @@ fn one_sample_s_path_is_printed_and_adds_up_to_its_pixel() {
     let one = ["--width", "24", "--height", "18", "--spp", "1"];
     let spheres = spheres();
     let base = || ["render", spheres.to_str().unwrap()].into_iter().chain(one);
-    desk.run(base().chain(["-o", "a.exr"])).ends_with(0);
-    let raster = desk.raster("a.exr");
-    let [r, _, _] = raster.picture().rgb().unwrap();
-    let lit = (0..r.len()).rev().find(|&i| r[i] > 0.0).expect("a lit pixel");
-    let pixel = format!("{},{}", lit % 24, lit / 24);
-    let run = desk.run(base().chain(["--pixel", &pixel, "--sample", "0"])).ends_with(0);
-    assert!(run.stdout.starts_with("  1  at ("), "{}", run.stdout);
-    let last = run.stdout.lines().last().unwrap();
-    let red: f32 = last.strip_prefix("radiance [").unwrap().split(',').next().unwrap().parse().unwrap();
-    assert!((red - r[lit]).abs() <= 1e-6 * r[lit], "{red} against {}", r[lit]);
+    for (splitting, starts) in [("never", "  1  at ("), ("always", "branch 1 of 2\n  1  at (")] {
+        let splitting = format!("render.splitting={splitting}");
+        let base = || base().chain(["--set", &splitting]);
+        desk.run(base().chain(["-o", "a.exr"])).ends_with(0);
+        let raster = desk.raster("a.exr");
+        let [r, _, _] = raster.picture().rgb().unwrap();
+        let lit = (0..r.len()).rev().find(|&i| r[i] > 0.0).expect("a lit pixel");
+        let pixel = format!("{},{}", lit % 24, lit / 24);
+        let run = desk.run(base().chain(["--pixel", &pixel, "--sample", "0"])).ends_with(0);
+        assert!(run.stdout.starts_with(starts), "{}", run.stdout);
+        assert_eq!(run.stdout.contains("\nbranch 2 of 2\n  1  at ("), starts.starts_with("branch"));
+        let last = run.stdout.lines().last().unwrap();
+        let red: f32 = last.strip_prefix("radiance [").unwrap().split(',').next().unwrap().parse().unwrap();
+        assert!((red - r[lit]).abs() <= 1e-6 * r[lit], "{red} against {}", r[lit]);
+    }
     for (pixel, sample) in [("24,0", "0"), ("0,18", "0"), ("0,0", "1")] {
         let run = desk.run(base().chain(["--pixel", pixel, "--sample", sample])).ends_with(2);
         run.tells("the image has 24 × 18 pixels of 1 samples");
