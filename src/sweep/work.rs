@@ -11,6 +11,11 @@ use crate::render::Control;
 /// Unless asked for more, jobs are rendered together as long as they take no more camera paths than this: some minutes' work, which is
 /// what a killed run loses.
 const MOST_PATHS: u64 = 1 << 29;
+/// No more jobs than this wait: each is prepared.
+const MOST_WAITING: usize = 32;
+
+/// Jobs with their places, to be rendered together.
+type Group = Vec<(usize, Ready)>;
 
 /// What is done and what waits.
 pub(super) struct Work<'a> {
@@ -18,8 +23,8 @@ pub(super) struct Work<'a> {
     destination: &'a Destination,
     options: &'a Options,
     pub(super) observer: &'a mut dyn Observer,
-    /// Jobs with their places, to be rendered together.
-    waiting: Vec<(usize, Ready)>,
+    /// Those that came first are first.
+    waiting: Vec<Group>,
     records: Vec<(usize, JobRecord)>,
     reused: usize,
 }
@@ -34,7 +39,7 @@ impl<'a> Work<'a> {
         Self { build, destination, options, observer, waiting: Vec::new(), records: Vec::new(), reused: 0 }
     }
 
-    /// Reuses a job, or lets it wait for others that can be rendered with it; those that can't are rendered first.
+    /// Reuses a job, or lets it wait for others that can be rendered with it, maybe after some that can't.
     pub(super) fn take(
         &mut self,
         index: usize,
@@ -62,12 +67,7 @@ impl<'a> Work<'a> {
             return Ok(());
         }
         match job::prepare(planned, loaded, self.build, self.destination) {
-            Ok(ready) => {
-                if !self.has_room_for(&ready) {
-                    self.render_waiting()?;
-                }
-                self.waiting.push((index, ready));
-            }
+            Ok(ready) => self.wait(index, ready)?,
             Err(record) => {
                 self.render_waiting()?;
                 job::keep_record(&record, self.destination)?;
@@ -77,29 +77,56 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Whether a job can be rendered with those that wait.
-    fn has_room_for(&self, ready: &Ready) -> bool {
-        let count = self.waiting.len() + 1;
-        let is_short = match self.options.together {
+    /// Lets a job wait with those that it can be rendered with; renders these if there can't be more, and the first ones if too many wait.
+    fn wait(&mut self, index: usize, ready: Ready) -> Result<(), SweepError> {
+        let place = self.waiting.iter().position(|group| self.has_room_for(group, &ready));
+        let place = place.unwrap_or_else(|| {
+            self.waiting.push(Group::new());
+            self.waiting.len() - 1
+        });
+        let is_full = !self.is_short(&ready, self.waiting[place].len() + 2);
+        self.waiting[place].push((index, ready));
+        if is_full {
+            self.render_group(place)?;
+        } else if self.waiting.iter().map(Group::len).sum::<usize>() > MOST_WAITING {
+            self.render_group(0)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a job can be rendered with those of a group.
+    fn has_room_for(&self, group: &Group, ready: &Ready) -> bool {
+        let others: Vec<&Ready> = group.iter().map(|(_, ready)| ready).collect();
+        self.is_short(ready, group.len() + 1) && ready.joins(&others)
+    }
+
+    /// Whether so many jobs like this one may be rendered together.
+    fn is_short(&self, ready: &Ready, count: usize) -> bool {
+        match self.options.together {
             Some(most) => count <= most.get(),
             None => ready.paths().saturating_mul(count as u64) <= MOST_PATHS,
-        };
-        let waiting: Vec<&Ready> = self.waiting.iter().map(|(_, ready)| ready).collect();
-        is_short && ready.joins(&waiting)
+        }
     }
 
     /// Renders the jobs that wait.
     pub(super) fn render_waiting(&mut self) -> Result<(), SweepError> {
-        let waiting = std::mem::take(&mut self.waiting);
-        if waiting.is_empty() || self.is_over() {
+        while !self.waiting.is_empty() {
+            self.render_group(0)?;
+        }
+        Ok(())
+    }
+
+    fn render_group(&mut self, place: usize) -> Result<(), SweepError> {
+        let group = self.waiting.remove(place);
+        if self.is_over() {
             return Ok(());
         }
-        let ready: Vec<&Ready> = waiting.iter().map(|(_, ready)| ready).collect();
+        let ready: Vec<&Ready> = group.iter().map(|(_, ready)| ready).collect();
         let jobs: Vec<&Job> = ready.iter().map(|ready| ready.job()).collect();
         let control = Arc::new(Control::default());
         self.observer.started(&jobs, &control);
         let records = job::run_together(&ready, self.build, self.destination, &control)?;
-        for ((index, _), record) in waiting.iter().zip(records) {
+        for ((index, _), record) in group.iter().zip(records) {
             self.add(*index, record, false);
         }
         Ok(())

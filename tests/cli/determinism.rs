@@ -1,6 +1,6 @@
 //! The same job gives the same bits: with any number of threads, alone or in a sweep, in one part or several.
 
-use crate::support::{Desk, SMALL_ARGUMENTS, read, repository, same_pixels};
+use crate::support::{Desk, SMALL, SMALL_ARGUMENTS, read, repository, same_pixels};
 
 #[test]
 fn one_thread_and_two_write_the_same_bytes() {
@@ -39,9 +39,30 @@ fn jobs_rendered_together_write_the_bytes_that_they_write_one_by_one() {
     alone.sweep(&["--together", "1"]).ends_with(0);
     assert_eq!(together.images().len(), 3);
     assert!(together.image_bytes() == alone.image_bytes());
-    let says_so =
-        |desk: &Desk| desk.record("roughness=0.10").skipped.iter().any(|skip| skip.contains("% of the rays"));
-    assert!(says_so(&together) && !says_so(&alone));
+    assert!(is_shared(&together, "roughness=0.10") && !is_shared(&alone, "roughness=0.10"));
+}
+
+fn is_shared(desk: &Desk, job: &str) -> bool {
+    desk.record(job).skipped.iter().any(|skip| skip.contains("% of the rays"))
+}
+
+/// The job in the middle glows, so that its lights are its own: those before and after it are still rendered together.
+#[test]
+fn jobs_that_can_be_rendered_together_wait_for_each_other() {
+    let scene = repository("scenes/spheres.glb");
+    let desk = Desk::new(&format!(
+        r#"scene = '{}'
+        [[axis]]
+        zip = ["material.metallic.roughness", "material.metallic.emission_color"]
+        values = [[0.1, [0, 0, 0]], [0.5, [1, 1, 1]], [0.9, [0, 0, 0]]]
+        labels = ["a", "b", "c"]
+        {SMALL}"#,
+        scene.display()
+    ));
+    desk.sweep(&[]).ends_with(0);
+    let names: Vec<String> = desk.images().iter().map(|n| n.trim_end_matches(".exr").to_owned()).collect();
+    let shared: Vec<bool> = names.iter().map(|name| is_shared(&desk, name)).collect();
+    assert_eq!(shared, [true, false, true], "{names:?}");
 }
 
 #[test]
