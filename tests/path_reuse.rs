@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use common::lit::{
     assert_same_means, assert_same_on_any_threads, ball, bottled, camera, clear, covered, dull, facing, lamp,
-    leaning, rendered, shiny, sunny, walls,
+    leaning, prepared, rendered, shiny, sunny, walls,
 };
 use common::{lambert, metal, scene, small};
 use glam::Vec3;
-use pipeline::render::{Geometry, Prepared, replay};
+use pipeline::render::replay;
 use pipeline::scene::{Camera, Scene};
 use pipeline::settings::{Filter, RenderSettings, Use};
 
@@ -57,12 +57,6 @@ fn path_reuse_has_the_same_bits_on_any_number_of_threads() {
         let settings = RenderSettings { light_paths, path_reuse: Use::Always, error, ..small(41, 31, 33, 6) };
         assert_same_on_any_threads(&world, &settings);
     }
-}
-
-fn prepared(world: &Scene, settings: &RenderSettings) -> Prepared {
-    let world = Arc::new(world.clone());
-    let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
-    Prepared::new(world, geometry, settings).expect("prepared")
 }
 
 /// What a replay tells of a pixel's samples is what the picture has there, also in a block that the edge cuts off.

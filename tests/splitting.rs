@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use common::lit::{
     assert_same_means, assert_same_on_any_threads, ball, bottled, camera, covered, dull, lamp, leaning,
-    rendered, shiny, sunny,
+    prepared, rendered, shiny, sunny,
 };
 use common::{emitting, lambert, scene, set_sky, small};
 use glam::Vec3;
-use pipeline::render::{Geometry, Prepared, replay};
+use pipeline::render::replay;
 use pipeline::scene::Scene;
 use pipeline::settings::{Filter, Integrator, RenderSettings, Use};
 
@@ -18,12 +18,6 @@ use pipeline::settings::{Filter, Integrator, RenderSettings, Use};
 fn plain(spp: u32) -> RenderSettings {
     let never = Use::Never;
     RenderSettings { light_paths: never, path_reuse: never, splitting: never, ..small(32, 24, spp, 5) }
-}
-
-fn prepared(world: &Scene, settings: &RenderSettings) -> Prepared {
-    let world = Arc::new(world.clone());
-    let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
-    Prepared::new(world, geometry, settings).expect("prepared")
 }
 
 /// A ball in the open, of which the picture shows mostly the sky.

@@ -1,8 +1,9 @@
 //! Whether light paths, those of neighbouring pixels and branches pay for themselves in a scene, told by a few paths before the render.
 //!
-//! What neighbours and branches save is seen in a few pixels. What light paths save is the noise of light that the camera's paths find too rarely to be measured by a few of these. But light paths meet it, and
-//! know how rarely the others do: where a light path's contribution c to a pixel has the weight 1/(1 + o²) against camera paths that
-//! are o times as dense, camera paths alone have the second moment c²(1 + o²)²/o there; beside light paths, which have c², they have c²o³.
+//! What neighbours and branches save is seen in a few pixels. What light paths save is the noise of light that the camera's paths find too
+//! rarely to be measured by a few of these. But light paths meet it, and know how rarely the others do: where a light path's contribution c
+//! to a pixel has the weight 1/(1 + o²) against camera paths that are o times as dense, camera paths alone have the second moment
+//! c²(1 + o²)²/o there; beside light paths, which have c², they have c²o³.
 //! The difference, c²(1/o + 2o), is saved where a camera path would find many times what is seen there. Elsewhere evenly spread points leave
 //! hardly any noise of what moments tell: in the open under a sky light paths pay for nothing. Errors are relative to what is seen, as
 //! everywhere ([`crate::math::stats::relative_square`]); costs are counted in rays, so that the answer depends on the scene and the

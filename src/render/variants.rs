@@ -41,9 +41,8 @@ impl<'a> Variants<'a> {
     /// Takes in as many of `scenes` as follow the first one and are variants of it.
     ///
     /// None of the materials that differ may emit light or let shadow rays pass, and everything else must be the same: geometry,
-    /// textures, lights, camera and settings; light paths start in all or none, pixels share paths in blocks of the same size, and samples branch in
-    /// all or none. There are
-    /// at most 16, and at most as many as two gigabytes hold the pixels of.
+    /// textures, lights, camera and settings; light paths start in all or none, pixels share paths in blocks of the same size, and samples
+    /// branch in all or none. There are at most 16, and at most as many as two gigabytes hold the pixels of.
     pub fn leading(scenes: impl IntoIterator<Item = &'a Prepared>) -> Option<Self> {
         let mut scenes = scenes.into_iter();
         let mut variants = Self::alone(scenes.next()?);

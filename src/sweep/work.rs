@@ -11,8 +11,9 @@ use crate::render::Control;
 /// Unless asked for more, jobs are rendered together as long as they take no more camera paths than this: some minutes' work, which is
 /// what a killed run loses.
 const MOST_PATHS: u64 = 1 << 29;
-/// No more jobs than this wait: each is prepared.
+/// No more jobs than this wait, in no more groups: each is prepared, and has its lights in memory.
 const MOST_WAITING: usize = 32;
+const MOST_GROUPS: usize = 4;
 
 /// Jobs with their places, to be rendered together.
 type Group = Vec<(usize, Ready)>;
@@ -88,7 +89,9 @@ impl<'a> Work<'a> {
         self.waiting[place].push((index, ready));
         if is_full {
             self.render_group(place)?;
-        } else if self.waiting.iter().map(Group::len).sum::<usize>() > MOST_WAITING {
+        } else if self.waiting.len() > MOST_GROUPS
+            || self.waiting.iter().map(Vec::len).sum::<usize>() > MOST_WAITING
+        {
             self.render_group(0)?;
         }
         Ok(())

@@ -182,9 +182,13 @@ pub(crate) fn sunny() -> Scene {
     world
 }
 
-pub(crate) fn rendered(world: &Arc<Scene>, settings: &RenderSettings) -> Rendered {
+pub(crate) fn prepared(world: &Scene, settings: &RenderSettings) -> Prepared {
     let geometry = Arc::new(Geometry::build(world).expect("geometry"));
-    let prepared = Prepared::new(Arc::clone(world), geometry, settings).expect("prepared");
+    Prepared::new(Arc::new(world.clone()), geometry, settings).expect("prepared")
+}
+
+pub(crate) fn rendered(world: &Arc<Scene>, settings: &RenderSettings) -> Rendered {
+    let prepared = prepared(world, settings);
     assert_eq!(prepared.has_light_paths(), settings.light_paths != Use::Never);
     assert_eq!(prepared.has_path_reuse(), settings.path_reuse != Use::Never);
     let rendered = render(&prepared, &Control::default()).expect("rendered");
