@@ -64,6 +64,10 @@ pub struct RenderSettings {
     /// time, where finding those surfaces is most of the work.
     #[serde(skip_serializing_if = "is_default")]
     pub splitting: Use,
+    /// Give noisy parts of the picture more samples than others, up to eight times `spp`, and the others fewer, down to a quarter, for as many
+    /// rays as `spp` samples everywhere take.
+    #[serde(skip_serializing_if = "is_default")]
+    pub adaptive: Use,
 }
 
 /// Whether a technique is used.
@@ -216,6 +220,7 @@ impl Default for RenderSettings {
             light_paths: Use::Auto,
             path_reuse: Use::Auto,
             splitting: Use::Auto,
+            adaptive: Use::Auto,
         }
     }
 }

@@ -49,11 +49,14 @@ fn one_and_many_threads_give_the_same_bits() {
 #[test]
 fn a_longer_render_begins_with_the_shorter_one_s_samples_up_to_the_next_power_of_two() {
     use pipeline::render::{Geometry, Prepared, replay};
+    use pipeline::settings::Use;
     use std::sync::Arc;
     let world = Arc::new(test_scene());
     let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
-    let prepared =
-        |spp| Prepared::new(world.clone(), geometry.clone(), &small(20, 20, spp, 8)).expect("prepared");
+    let prepared = |spp| {
+        let settings = RenderSettings { adaptive: Use::Never, ..small(20, 20, spp, 8) };
+        Prepared::new(world.clone(), geometry.clone(), &settings).expect("prepared")
+    };
     let (short, long, longer) = (prepared(33), prepared(64), prepared(65));
     for sample in 0..33 {
         assert_eq!(replay(&short, 11, 9, sample), replay(&long, 11, 9, sample));

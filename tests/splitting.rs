@@ -5,8 +5,8 @@ mod common;
 use std::sync::Arc;
 
 use common::lit::{
-    assert_same_means, assert_same_on_any_threads, ball, bottled, camera, covered, dull, lamp, leaning,
-    prepared, rendered, shiny, sunny,
+    assert_same_means, assert_same_on_any_threads, ball, bottled, camera, covered, dull, error_and_rays,
+    lamp, leaning, open, prepared, rendered, shiny, sunny,
 };
 use common::{emitting, lambert, scene, set_sky, small};
 use glam::Vec3;
@@ -17,18 +17,13 @@ use pipeline::settings::{Filter, Integrator, RenderSettings, Use};
 /// Without other techniques.
 fn plain(spp: u32) -> RenderSettings {
     let never = Use::Never;
-    RenderSettings { light_paths: never, path_reuse: never, splitting: never, ..small(32, 24, spp, 5) }
-}
-
-/// A ball in the open, of which the picture shows mostly the sky.
-fn open(radius: f32) -> Scene {
-    let mut world = scene(vec![(ball(radius, Vec3::Y), lambert(0.6))], camera());
-    set_sky(
-        &mut world,
-        [8, 4],
-        (0..32).map(|i| if i == 11 { 6.0 } else { 0.2 + 0.01 * (i % 5) as f32 }).collect(),
-    );
-    world
+    RenderSettings {
+        light_paths: never,
+        path_reuse: never,
+        splitting: never,
+        adaptive: never,
+        ..small(32, 24, spp, 5)
+    }
 }
 
 #[test]
@@ -91,19 +86,6 @@ fn replayed_samples_have_the_mean_that_the_picture_has() {
     }
 }
 
-/// The error relative to a long render, and the rays it took.
-fn error_and_rays(world: &Arc<Scene>, settings: &RenderSettings, reference: &[Vec<f32>; 3]) -> (f64, f64) {
-    let (mut error, mut rays) = (0.0, 0.0);
-    for seed in 0..4 {
-        let rendered = rendered(world, &RenderSettings { seed, ..settings.clone() });
-        rays += rendered.counts.rays as f64;
-        let picture = rendered.raster.picture().rgb().expect("colour");
-        let values = picture.into_iter().flatten().zip(reference.iter().flatten());
-        error += values.map(|(x, r)| f64::from((x - r) * (x - r)) / f64::from(r * r + 0.01)).sum::<f64>();
-    }
-    (error, rays)
-}
-
 /// Half the noise for few more rays: those that see the sky are traced once.
 #[test]
 fn in_the_open_branches_halve_the_noise_for_few_rays() {
@@ -111,9 +93,7 @@ fn in_the_open_branches_halve_the_noise_for_few_rays() {
     let without = plain(16);
     let with = RenderSettings { splitting: Use::Always, ..without.clone() };
     let long = RenderSettings { seed: 99, ..plain(2048) };
-    let reference = rendered(&world, &long).raster.picture().rgb().expect("colour").map(<[f32]>::to_vec);
-    let (with, without) =
-        (error_and_rays(&world, &with, &reference), error_and_rays(&world, &without, &reference));
+    let (with, without) = (error_and_rays(&world, &with, &long), error_and_rays(&world, &without, &long));
     assert!(with.0 < 0.6 * without.0 && with.0 > 0.2 * without.0, "{with:?} {without:?}");
     assert!(with.1 > without.1 && with.1 < 1.3 * without.1, "{with:?} {without:?}");
 }

@@ -17,6 +17,7 @@ const ALL: Techniques = Techniques {
     light_paths: true,
     path_reuse: true,
     splitting: true,
+    adaptive: true,
     constants: true,
     coverage: true,
     useful_light: true,
@@ -33,8 +34,14 @@ fn scene(name: &str) -> LoadedScene {
 fn prepared(scene: &LoadedScene, spp: u32) -> Prepared {
     let light_paths = Use::Always;
     let size = RenderSettings { width: Some(32), height: Some(24), ..RenderSettings::default() };
-    let settings =
-        RenderSettings { spp, light_paths, path_reuse: Use::Always, splitting: Use::Always, ..size };
+    let settings = RenderSettings {
+        spp,
+        light_paths,
+        path_reuse: Use::Always,
+        splitting: Use::Always,
+        adaptive: Use::Always,
+        ..size
+    };
     Prepared::new(Arc::clone(&scene.scene), Arc::clone(&scene.geometry), &settings).expect("prepared")
 }
 
@@ -122,6 +129,7 @@ fn without_what_lessens_noise_the_expectation_is_the_same() {
             Techniques { light_paths: false, ..ALL },
             Techniques { path_reuse: false, ..ALL },
             Techniques { splitting: false, ..ALL },
+            Techniques { adaptive: false, ..ALL },
         ] {
             let without = rendered(&prepared(&scene, 256).with(techniques));
             // The box has no material of two lobes, and the other's cut-outs keep paths from being reused.

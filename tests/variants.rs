@@ -164,6 +164,23 @@ fn branches_are_shared_to_the_same_bits() {
     }
 }
 
+/// Each has its own plan, and they go on together as far as both go.
+#[test]
+fn variants_that_plan_their_samples_have_the_bits_that_each_has_alone() {
+    for (path_reuse, light_paths) in [(Use::Never, Use::Always), (Use::Always, Use::Never)] {
+        let mut looks = looks();
+        if path_reuse == Use::Always {
+            looks.iter_mut().for_each(|world| world.materials[VEIL].item.opacity = Opacity::default());
+        }
+        let settings = RenderSettings { adaptive: Use::Always, path_reuse, spp: 16, ..settings(light_paths) };
+        let scenes = prepared(&looks, &[settings]);
+        assert!(scenes.iter().all(Prepared::is_adaptive));
+        assert_the_same(&scenes);
+        let paths: Vec<u64> = together(&scenes).iter().map(|rendered| rendered.counts.paths).collect();
+        assert!(paths.iter().any(|&count| count != paths[0]), "they have different plans: {paths:?}");
+    }
+}
+
 #[test]
 fn each_variant_ends_where_its_own_error_is_reached() {
     let settings = RenderSettings { error: Some(0.004), spp: 256, ..settings(Use::Never) };

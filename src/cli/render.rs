@@ -160,7 +160,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let prepared =
         Prepared::new(Arc::clone(&planned.scene), Arc::clone(&loaded.geometry), &planned.settings)?;
     if let Some((x, y)) = arguments.pixel {
-        return tell_path(&prepared, &planned, x, y, arguments.sample);
+        return tell_path(&prepared, x, y, arguments.sample);
     }
     let outputs = match &config {
         Some(config) if format.is_none() => {
@@ -309,12 +309,13 @@ fn write(path: &Path, format: Format, raster: &Raster, display: &Display) -> Out
     Ok(WELL)
 }
 
-fn tell_path(prepared: &Prepared, planned: &PlannedJob, x: u32, y: u32, sample: u32) -> Outcome {
+fn tell_path(prepared: &Prepared, x: u32, y: u32, sample: u32) -> Outcome {
     let (width, height) = prepared.size();
-    if x >= width || y >= height || sample >= planned.settings.spp {
+    let most = prepared.most_samples();
+    if x >= width || y >= height || sample >= most {
+        let samples = if prepared.is_adaptive() { format!("at most {most}") } else { most.to_string() };
         return Err(format!(
-            "the image has {width} × {height} pixels of {} samples; there is no sample {sample} of pixel {x},{y}",
-            planned.settings.spp
+            "the image has {width} × {height} pixels of {samples} samples; there is no sample {sample} of pixel {x},{y}",
         )
         .into());
     }

@@ -5,12 +5,14 @@ use std::time::{Duration, Instant};
 
 use glam::Vec2;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
+use super::adaptive::Plan;
 use super::integrators::integrate;
 use super::light_image::LightImage;
 use super::path::PathSample;
 use super::replay::ReplayVertex;
-use super::tile::{Block, NAMED_BAD_SAMPLES, Pixel, Tile, levels};
+use super::tile::{Block, Level, NAMED_BAD_SAMPLES, Pixel, Tile, levels};
 use super::variants::Variants;
 use super::{Prepared, RenderError};
 use crate::accel::Ray;
@@ -67,16 +69,15 @@ pub fn render_together(
 ) -> Result<(), RenderError> {
     let scenes = variants.scenes();
     let Some(&first) = scenes.first() else { return Ok(()) };
-    let settings = &first.settings;
     let total: u64 = scenes.iter().map(|scene| most_paths(scene)).sum();
     control.total_paths.store(total, Ordering::Relaxed);
     // At each place of the picture, one tile for each variant.
     let mut stacks: Vec<Vec<Tile>> =
         Tile::all(first).into_iter().map(|tile| vec![tile; scenes.len()]).collect();
     let mut lit: Vec<LightImage> = scenes.iter().map(|scene| LightImage::new(scene)).collect();
+    let mut plans: Vec<Option<Plan>> = scenes.iter().map(|_| None).collect();
     let deadline = control.time_limit.map(|limit| Instant::now() + limit);
-    let may_end_early = deadline.is_some() || settings.error.is_some();
-    for samples in levels(settings).filter(|&n| may_end_early || n == settings.spp) {
+    for level in levels(first, deadline.is_some()) {
         // Every tile gets its first samples, also after the deadline: a picture has no holes.
         let is_late = || deadline.is_some_and(|deadline| Instant::now() >= deadline);
         if is_late() && stacks.iter().flatten().all(|tile| tile.samples > 0) {
@@ -84,14 +85,26 @@ pub fn render_together(
         }
         for (variant, (lit, scene)) in lit.iter_mut().zip(scenes).enumerate() {
             if stacks.iter().any(|stack| !stack[variant].is_finished) {
-                lit.sample_up_to(scene, samples, control)?;
+                lit.sample_up_to(scene, level.samples.min(first.settings.spp), control)?;
             }
         }
         // One by one: rayon would leave a run of tiles to one thread while the others are done.
         stacks.par_iter_mut().with_max_len(1).try_for_each(|stack| {
             let ends = is_late() && stack.iter().all(|tile| tile.samples > 0);
-            if ends { Ok(()) } else { sample_up_to(variants, stack, samples, &lit, control) }
+            if ends { Ok(()) } else { sample_up_to(variants, stack, level, &plans, &lit, control) }
         })?;
+        if level.is_planned_after && !is_late() {
+            for (variant, plan) in plans.iter_mut().enumerate() {
+                let seen = stacks.iter().flat_map(|stack| stack[variant].seen(&lit[variant]));
+                *plan = Some(Plan::new(Tile::patches_of(first.size()), seen, &first.settings));
+            }
+            let planned = plans.iter().flatten().enumerate().map(|(variant, plan)| {
+                let of_lights = light_paths(scenes[variant]).saturating_sub(lit[variant].paths);
+                of_lights + stacks.iter().map(|stack| stack[variant].paths_to(plan)).sum::<u64>()
+            });
+            let done = control.paths.load(Ordering::Relaxed);
+            control.total_paths.store(done + planned.sum::<u64>(), Ordering::Relaxed);
+        }
     }
     for (variant, (scene, lit)) in scenes.iter().zip(&lit).enumerate() {
         let tiles = stacks.iter_mut().map(|stack| std::mem::take(&mut stack[variant]));
@@ -103,15 +116,19 @@ pub fn render_together(
 /// Camera and light paths that the settings allow.
 fn most_paths(scene: &Prepared) -> u64 {
     let (width, height) = scene.size();
-    let from_lights = scene.light_paths.as_ref().map_or(0, |plan| plan.paths(scene.settings.spp));
-    u64::from(width) * u64::from(height) * u64::from(scene.settings.spp) + from_lights
+    u64::from(width) * u64::from(height) * u64::from(scene.settings.spp) + light_paths(scene)
 }
 
-/// Goes on with the tiles at one place until the pixels of those that are not finished have `samples` of them.
+fn light_paths(scene: &Prepared) -> u64 {
+    scene.light_paths.as_ref().map_or(0, |plan| plan.paths(scene.settings.spp))
+}
+
+/// Goes on with the tiles at one place until the pixels of those that are not finished have the `level`'s samples, or their planned ones.
 fn sample_up_to(
     variants: &Variants<'_>,
     tiles: &mut [Tile],
-    samples: u32,
+    level: Level,
+    plans: &[Option<Plan>],
     lit: &[LightImage],
     control: &Control,
 ) -> Result<(), RenderError> {
@@ -119,29 +136,48 @@ fn sample_up_to(
     let going: Vec<usize> = (0..tiles.len()).filter(|&variant| !tiles[variant].is_finished).collect();
     let Some(&any) = going.first() else { return Ok(()) };
     for &variant in &going {
-        tiles[variant].begin(settings, samples);
+        tiles[variant].begin(settings, level.samples, plans[variant].as_ref());
     }
-    // They began together and go on together.
-    let taken = tiles[any].samples;
     let blocks: Vec<Block> = tiles[any].blocks(variants.block_sides()).collect();
     for block in &blocks {
         if control.stop.load(Ordering::Relaxed) {
             return Err(RenderError::Cancelled);
         }
-        for sample in taken..samples {
-            variants.sample(&going, block, sample, |variant, place, path, shared_rays| {
-                tiles[variant].add(block[place], sample, path);
-                tiles[variant].shared_rays += shared_rays;
-            });
+        let patch = tiles[any].patch(block[0]);
+        // They began together, and each goes on to its own goal.
+        let mut taken = tiles[any].patches[patch].samples;
+        let goal = |tiles: &[Tile], variant: usize| tiles[variant].patches[patch].goal;
+        loop {
+            let going: SmallVec<[usize; 16]> =
+                going.iter().copied().filter(|&variant| goal(tiles, variant) > taken).collect();
+            let Some(next) = going.iter().map(|&variant| goal(tiles, variant)).min() else { break };
+            sample_block(variants, tiles, &going, block, taken..next);
+            let paths = u64::from(next - taken) * (going.len() * block.len()) as u64;
+            control.paths.fetch_add(paths, Ordering::Relaxed);
+            taken = next;
         }
-        let paths = u64::from(samples - taken) * (going.len() * block.len()) as u64;
-        control.paths.fetch_add(paths, Ordering::Relaxed);
     }
     for variant in going {
-        let spared = tiles[variant].end(settings, samples, &lit[variant]);
+        let spared = tiles[variant].end(settings, level, &lit[variant]);
         control.paths.fetch_add(spared, Ordering::Relaxed);
     }
     Ok(())
+}
+
+/// Takes samples of a block for the tiles of the variants that are `going` on.
+fn sample_block(
+    variants: &Variants<'_>,
+    tiles: &mut [Tile],
+    going: &[usize],
+    block: &Block,
+    samples: std::ops::Range<u32>,
+) {
+    for sample in samples {
+        variants.sample(going, block, sample, |variant, place, path, shared_rays| {
+            tiles[variant].add(block[place], sample, path);
+            tiles[variant].shared_rays += shared_rays;
+        });
+    }
 }
 
 /// The picture that the tiles make.
@@ -157,8 +193,8 @@ fn developed(scene: &Prepared, tiles: impl Iterator<Item = Tile>, lit: &LightIma
     let mut shared_rays = 0;
     for mut tile in tiles {
         shared_rays += tile.shared_rays;
-        counts.rays += tile.rays;
-        counts.paths += u64::from(tile.samples) * tile.area();
+        counts.rays += tile.rays();
+        counts.paths += tile.paths();
         counts.bad_samples += tile.bad_count;
         counts.first_bad_samples.append(&mut tile.bad);
         for ((x, y), pixel) in tile.pixels(lit) {
@@ -175,6 +211,10 @@ fn developed(scene: &Prepared, tiles: impl Iterator<Item = Tile>, lit: &LightIma
 pub(super) fn camera_sample(scene: &Prepared, x: u32, y: u32, sample: u32) -> (Sampler, Ray) {
     let settings = &scene.settings;
     let sampler = match scene.techniques.sobol {
+        // To complete each other, pixels have to have equally many.
+        true if scene.adaptive.is_ok() => {
+            Sampler::new(settings.seed, x, y, sample, settings.effective_replicates())
+        }
         true => {
             Sampler::in_square(settings.seed, (x, y), sample, settings.spp, settings.effective_replicates())
         }

@@ -34,7 +34,7 @@ pub(super) struct LightImage {
     width: u32,
     replicates: u32,
     /// Paths so far.
-    paths: u64,
+    pub(super) paths: u64,
     pub(super) rays: u64,
     pub(super) bad_count: u64,
     /// By pixel, row by row, all replicates of a pixel together; empty without light paths.

@@ -2,6 +2,7 @@
 //!
 //! [`Geometry`] holds what the jobs of a sweep share; [`Prepared`] adds what a job's own materials, lights and camera need.
 
+mod adaptive;
 mod camera;
 mod direct;
 mod film;

@@ -62,6 +62,10 @@ const SPREAD: f64 = 1.0 / 3.0;
 const MOST_RAYS_BEYOND: f64 = 0.4;
 const LEAST_BEYOND: f64 = 0.5;
 
+/// Noisy parts of a picture get more samples where at least this part of the camera's paths meets nothing. Elsewhere what equal numbers waste is
+/// about what pixels save that complete each other, as they only do with equal numbers. Measured: 0.3 to 0.9 of the error, against 0.85 to 1.06.
+const LEAST_UNMET: f64 = 0.25;
+
 /// A pixel's camera paths.
 struct Look {
     cell: usize,
@@ -73,6 +77,8 @@ struct Look {
     rays: u64,
     /// Paths that neighbours can use.
     shared: u64,
+    /// Paths that met nothing.
+    unmet: u32,
 }
 
 /// A block of eight pixels that use each other's paths: the variances of one sample's part that neighbours can use, if none joins, and if
@@ -95,6 +101,7 @@ pub(super) struct Choice {
     pub(super) light_paths: Result<(), String>,
     pub(super) path_reuse: Result<BlockSize, String>,
     pub(super) splitting: Result<(), String>,
+    pub(super) adaptive: Result<(), String>,
 }
 
 /// What each technique is worth, per sample of a pixel.
@@ -116,6 +123,8 @@ struct Worth {
     rays: f64,
     /// The part of the variance of camera paths that comes from beyond the first surface; 0 where it is not asked for.
     beyond: f64,
+    /// The part of camera paths that meet nothing.
+    unmet: f64,
 }
 
 /// What is used.
@@ -169,6 +178,17 @@ impl Worth {
         }
     }
 
+    /// Whether noisy parts of the picture should get more samples, or why not.
+    fn adaptive(&self) -> Result<(), String> {
+        let full = 100.0 * (1.0 - self.unmet);
+        let why = || {
+            format!(
+                "surfaces fill {full:.0}% of the picture, and pixels with equal numbers complete each other"
+            )
+        };
+        if self.unmet < LEAST_UNMET { Err(why()) } else { Ok(()) }
+    }
+
     /// What a technique that `with` has and `without` has not would bring.
     fn told(&self, with: Used, without: Used) -> String {
         let ((error, cost), (error_before, cost_before)) = (self.of(with), self.of(without));
@@ -182,11 +202,13 @@ impl Worth {
 /// in any case.
 pub(super) fn choose(scene: &Prepared, can_reuse: bool, can_split: bool) -> Choice {
     let can_light = scene.light_paths.is_ok();
-    let mut choice = Choice { light_paths: Ok(()), path_reuse: Ok(BlockSize::Four), splitting: Ok(()) };
+    let mut choice =
+        Choice { light_paths: Ok(()), path_reuse: Ok(BlockSize::Four), splitting: Ok(()), adaptive: Ok(()) };
     let light_is_open = can_light && scene.settings.light_paths == Use::Auto;
     let reuse_is_open = can_reuse && scene.settings.path_reuse == Use::Auto;
+    let adaptive_is_open = scene.adaptive.is_ok() && scene.settings.adaptive == Use::Auto;
     let splitting_is_open = can_split && scene.settings.splitting == Use::Auto;
-    if !(light_is_open || can_reuse || splitting_is_open) {
+    if !(light_is_open || can_reuse || splitting_is_open || adaptive_is_open) {
         return choice;
     }
     let worth = measure(scene, can_reuse, splitting_is_open);
@@ -194,8 +216,14 @@ pub(super) fn choose(scene: &Prepared, can_reuse: bool, can_split: bool) -> Choi
         if with { is_possible } else { is_open || !is_possible }
     };
     let with_light = [false, true].into_iter().filter(|&with| may_be(light_is_open, can_light, with));
+    if adaptive_is_open {
+        choice.adaptive = worth.adaptive();
+    }
     let sizes = [None, Some(BlockSize::Four), Some(BlockSize::Eight)];
-    let with_reuse = sizes.into_iter().filter(|size| may_be(reuse_is_open, can_reuse, size.is_some()));
+    // Pixels of a block have equal numbers of samples.
+    let is_adaptive = scene.adaptive.is_ok() && choice.adaptive.is_ok();
+    let sizes = sizes.into_iter().filter(|&size| !(is_adaptive && size == Some(BlockSize::Eight)));
+    let with_reuse = sizes.filter(|size| may_be(reuse_is_open, can_reuse, size.is_some()));
     let ways = with_light
         .flat_map(|light_paths| with_reuse.clone().map(move |path_reuse| Used { light_paths, path_reuse }));
     let best = ways.min_by(|&a, &b| worth.work(a).total_cmp(&worth.work(b)));
@@ -284,6 +312,8 @@ fn measure(scene: &Prepared, can_reuse: bool, can_split: bool) -> Worth {
         light_cost: COST * light_rays / camera_rays,
         joinable: shared_paths / camera_rays,
         rays,
+        unmet: looks.iter().map(|look| f64::from(look.unmet)).sum::<f64>()
+            / (looks.len() as f64 * f64::from(PER_PIXEL)),
         beyond: if may_split { part_beyond(scene, looks.len() as u32, &means) } else { 0.0 },
     }
 }
@@ -313,7 +343,7 @@ fn camera_ray(scene: &Prepared, sampler: &Sampler, corner: Vec2) -> Ray {
 
 fn look(scene: &Prepared, index: u32, can_reuse: bool) -> Look {
     let corner = corner(scene, index);
-    let (mut rays, mut shared) = (0, 0);
+    let (mut rays, mut shared, mut unmet) = (0, 0, 0);
     // All of a sample, its own part, and of that what is seen glowing.
     let samples: [[[f64; 3]; 3]; PER_PIXEL as usize] = std::array::from_fn(|sample| {
         let sampler = sampler(scene, 1 + index, sample as u32, PER_PIXEL);
@@ -322,6 +352,7 @@ fn look(scene: &Prepared, index: u32, can_reuse: bool) -> Look {
         let mut visible = None;
         walk.go_on(scene, &sampler, None, |_| false, |vertex| _ = visible.get_or_insert(vertex.radiance));
         shared += u64::from(walk.is_lit_beyond());
+        unmet += u32::from(visible.is_none());
         let own = walk.path();
         let mut all = own;
         gather(scene, std::slice::from_ref(&walk), |(_, sample)| all = *sample);
@@ -351,6 +382,7 @@ fn look(scene: &Prepared, index: u32, can_reuse: bool) -> Look {
         own_variance,
         rays,
         shared,
+        unmet,
     }
 }
 

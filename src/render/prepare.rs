@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Vec2;
 
 use super::RenderError;
+use super::adaptive;
 use super::camera::FilmCamera;
 use super::filter::FilterSampler;
 use super::geometry::Geometry;
@@ -60,6 +61,8 @@ pub struct Prepared {
     pub(super) path_reuse: Result<BlockSize, String>,
     /// Samples branch at their first surface, or why they don't.
     pub(super) splitting: Result<(), String>,
+    /// Noisy parts of the picture get more samples than others; or why not.
+    pub(super) adaptive: Result<(), String>,
 }
 
 impl Prepared {
@@ -121,6 +124,7 @@ impl Prepared {
             techniques: Techniques::default(),
             path_reuse: Err(String::new()),
             splitting: Err(String::new()),
+            adaptive: adaptive(settings),
             scene,
             geometry,
         };
@@ -131,6 +135,7 @@ impl Prepared {
         prepared.light_paths = prepared.light_paths.and_then(|plan| choice.light_paths.map(|()| plan));
         prepared.path_reuse = path_reuse.and(choice.path_reuse);
         prepared.splitting = splitting.and(choice.splitting);
+        prepared.adaptive = prepared.adaptive.and(choice.adaptive);
         Ok(prepared)
     }
 
@@ -149,6 +154,9 @@ impl Prepared {
         }
         if !techniques.path_reuse {
             self.path_reuse = Err("left out".to_owned());
+        }
+        if !techniques.adaptive {
+            self.adaptive = Err("left out".to_owned());
         }
         if !techniques.splitting {
             self.splitting = Err("left out".to_owned());
@@ -172,6 +180,18 @@ impl Prepared {
     /// Columns and rows of the blocks whose pixels use each other's paths, if they do.
     pub fn reuse_block(&self) -> Option<(u32, u32)> {
         self.path_reuse.as_ref().ok().map(|block| block.sides())
+    }
+
+    /// No pixel has more samples than this.
+    pub fn most_samples(&self) -> u32 {
+        let adaptive =
+            self.adaptive.as_ref().ok().and_then(|()| adaptive::later_samples(&self.settings).last());
+        adaptive.unwrap_or(self.settings.spp)
+    }
+
+    /// Noisy parts of the picture get more samples than others.
+    pub fn is_adaptive(&self) -> bool {
+        self.adaptive.is_ok()
     }
 
     /// Samples branch at their first surface.
@@ -336,6 +356,20 @@ fn light_paths(
     match needed.into_iter().find(|(is_given, _)| !is_given) {
         Some((_, why)) => Err(why.to_owned()),
         None => Ok(LightPaths { per_sample: pixels.div_ceil(PIXELS_PER_PATH) }),
+    }
+}
+
+/// That noisy parts of a picture may get more samples than others, or why not.
+fn adaptive(settings: &RenderSettings) -> Result<(), String> {
+    let needed = [
+        (settings.adaptive != Use::Never, "the settings ask for none"),
+        (settings.integrator == Integrator::Path, "no paths are traced"),
+        (settings.error.is_none(), "samples go on until the error is small enough"),
+        (settings.spp >= adaptive::FEWEST_SAMPLES, "with so few samples the first of them tell nothing"),
+    ];
+    match needed.into_iter().find(|(is_given, _)| !is_given) {
+        Some((_, why)) => Err(why.to_owned()),
+        None => Ok(()),
     }
 }
 

@@ -42,6 +42,9 @@ impl Prepared {
         if let Err(why) = &self.splitting {
             skipped.push(format!("branches of samples: {why}"));
         }
+        if let Err(why) = &self.adaptive {
+            skipped.push(format!("more samples where it is noisy: {why}"));
+        }
         skipped.extend(self.absent_lights());
         skipped
     }

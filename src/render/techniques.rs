@@ -16,6 +16,8 @@ pub struct Techniques {
     pub path_reuse: bool,
     /// Samples branch at their first surface where that pays; without it none does.
     pub splitting: bool,
+    /// Noisy parts of a picture get more samples than others where that pays; without it all pixels get equally many.
+    pub adaptive: bool,
     /// Saves work: what is the same all over a material is worked out once; without it at each point.
     pub constants: bool,
     /// Saves work: where all surfaces are opaque, rays ask no material whether it is there.
@@ -33,6 +35,7 @@ impl Default for Techniques {
             light_paths: true,
             path_reuse: true,
             splitting: true,
+            adaptive: true,
             constants: true,
             coverage: true,
             useful_light: true,

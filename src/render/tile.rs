@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
 
 use super::Prepared;
+use super::adaptive::{self, Plan};
 use super::light_image::LightImage;
 use super::path::PathSample;
 use super::reuse;
@@ -15,6 +16,10 @@ use crate::settings::RenderSettings;
 /// The side of a tile in pixels: small enough to share the work out, large enough that rays stay together and that an error can be told
 /// from its pixels.
 const SIDE: u32 = 16;
+/// The side of a patch in pixels: no less than that of a block of four.
+const PATCH: u32 = 2;
+/// Patches in a row of a tile, and in a column.
+const PATCHES: u32 = SIDE / PATCH;
 /// How many bad samples are told by name.
 pub(super) const NAMED_BAD_SAMPLES: usize = 16;
 /// The fewest samples a pixel by which an error is judged.
@@ -52,6 +57,27 @@ struct Part {
     count: u32,
 }
 
+/// Pixels of a tile that have equal numbers of samples.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Patch {
+    /// Of each pixel, so far.
+    pub(super) samples: u32,
+    /// How many there are to be for now.
+    pub(super) goal: u32,
+    /// Where the second half of these begins, if they are halved.
+    second_half: Option<u32>,
+    rays: u64,
+}
+
+/// What the samples of a patch tell of it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seen {
+    /// The expected error of a pixel, as `bench` measures it.
+    pub(super) noise: f64,
+    /// Rays of a sample.
+    pub(super) rays: f64,
+}
+
 /// A rectangle of pixels under way.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tile {
@@ -59,12 +85,13 @@ pub(super) struct Tile {
     y0: u32,
     width: u32,
     height: u32,
-    /// Samples a pixel so far.
+    /// Those of the last level that it reached.
     pub(super) samples: u32,
     /// The settings ask for no more.
     pub(super) is_finished: bool,
-    pub(super) rays: u64,
-    /// Those of them that were traced for other variants too.
+    /// Row by row.
+    pub(super) patches: Vec<Patch>,
+    /// Rays that were traced for other variants too.
     pub(super) shared_rays: u64,
     pub(super) bad_count: u64,
     /// The first of them.
@@ -73,23 +100,53 @@ pub(super) struct Tile {
     sums: Vec<Sums>,
     /// By pixel, all of one pixel's together: of each replicate, or of a single one's first half and then of all its samples.
     parts: Vec<Part>,
-    /// Where the second half begins of a single replicate.
-    second_half: Option<u32>,
+    /// The parts are halves of a single replicate.
+    is_halved: bool,
     /// What the sums came to, by pixel; empty before the last sample.
     pixels: Vec<Pixel>,
 }
 
-/// Numbers of samples, each about twice the last, from as many as there are parts up to all: after each a render may end.
-pub(super) fn levels(settings: &RenderSettings) -> impl Iterator<Item = u32> + use<> {
-    let most = settings.spp;
-    let doubled = std::iter::successors(Some(settings.parts()), |n| n.checked_mul(2));
+/// Where a render may stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Level {
+    /// Of each pixel, where no less are planned.
+    pub(super) samples: u32,
+    /// How many each is to have is planned now.
+    pub(super) is_planned_after: bool,
+    pub(super) is_last: bool,
+}
+
+/// The levels of a render: several, each of about twice the samples of the last, where it may end early, by the time or an error.
+pub(super) fn levels(scene: &Prepared, has_time_limit: bool) -> Vec<Level> {
+    let settings = &scene.settings;
+    let (first, mut levels) = match scene.adaptive {
+        Ok(()) => {
+            let first = adaptive::first_samples(settings);
+            (Some(first), doubled(settings.parts(), first).chain(adaptive::later_samples(settings)).collect())
+        }
+        Err(_) => (None, doubled(settings.parts(), settings.spp).collect::<Vec<u32>>()),
+    };
+    let most = levels.last().copied();
+    if !has_time_limit && settings.error.is_none() {
+        levels.retain(|&samples| Some(samples) == most || Some(samples) == first);
+    }
+    let level =
+        |samples| Level { samples, is_planned_after: Some(samples) == first, is_last: Some(samples) == most };
+    levels.into_iter().map(level).collect()
+}
+
+/// Numbers of samples, each twice the last, up to the most.
+fn doubled(least: u32, most: u32) -> impl Iterator<Item = u32> {
+    let doubled = std::iter::successors(Some(least), |n| n.checked_mul(2));
     doubled.take_while(move |n| *n < most).chain(std::iter::once(most))
 }
 
-/// Memory for a pixel until its picture is finished: that of the result, and of the sums as well while the settings let all tiles go on.
-pub(super) fn bytes_a_pixel(settings: &RenderSettings) -> u64 {
+/// Memory for a pixel until its picture is finished: that of the result, and of the sums as well while all tiles may go on.
+pub(super) fn bytes_a_pixel(scene: &Prepared) -> u64 {
+    let settings = &scene.settings;
     let sums = size_of::<Sums>() + settings.parts() as usize * size_of::<Part>();
-    (size_of::<Pixel>() + if settings.error.is_some() { sums } else { 0 }) as u64
+    let may_all_go_on = settings.error.is_some() || scene.adaptive.is_ok();
+    (size_of::<Pixel>() + if may_all_go_on { sums } else { 0 }) as u64
 }
 
 impl Tile {
@@ -107,6 +164,11 @@ impl Tile {
         starts(height).flat_map(|y0| starts(width).map(move |x0| (x0, y0))).map(|(x, y)| tile(x, y)).collect()
     }
 
+    /// How many columns and rows of patches a picture of such size has.
+    pub(super) fn patches_of((width, height): (u32, u32)) -> (u32, u32) {
+        (width.div_ceil(PATCH), height.div_ceil(PATCH))
+    }
+
     /// The number of pixels.
     pub(super) fn area(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
@@ -119,26 +181,42 @@ impl Tile {
         corners.map(move |corner| reuse::block_around(corner, sides, end).collect())
     }
 
-    /// Makes ready for as many as `samples` of each pixel.
-    pub(super) fn begin(&mut self, settings: &RenderSettings, samples: u32) {
+    /// The index of the patch that a pixel is in.
+    #[inline]
+    pub(super) fn patch(&self, (x, y): (u32, u32)) -> usize {
+        ((y - self.y0) / PATCH * PATCHES + (x - self.x0) / PATCH) as usize
+    }
+
+    /// Makes ready for as many as `samples` of each pixel, or less where less are planned.
+    pub(super) fn begin(&mut self, settings: &RenderSettings, samples: u32, plan: Option<&Plan>) {
         let area = self.area() as usize;
         self.sums.resize(area, Sums::default());
         self.parts.resize(area * settings.parts() as usize, Part::default());
-        self.second_half = settings.is_halved().then(|| second_half(samples));
+        self.patches.resize((PATCHES * PATCHES) as usize, Patch::default());
+        self.is_halved = settings.is_halved();
+        let is_halved = self.is_halved;
+        for index in 0..self.patches.len() {
+            let planned = plan.and_then(|plan| plan.samples(self.in_picture(index as u32)));
+            let patch = &mut self.patches[index];
+            patch.goal = planned.map_or(samples, |planned| planned.min(samples));
+            patch.second_half = is_halved.then(|| second_half(patch.goal));
+        }
     }
 
     /// Adds sample `sample` of the pixel (x, y).
     #[inline]
     pub(super) fn add(&mut self, (x, y): (u32, u32), sample: u32, path: &PathSample) {
+        let patch = self.patch((x, y));
         let pixel = ((y - self.y0) * self.width + x - self.x0) as usize;
         let count = self.parts.len() / self.sums.len();
         let parts = &mut self.parts[pixel * count..][..count];
-        if self.second_half == Some(sample) {
+        let patch = &mut self.patches[patch];
+        patch.rays += path.rays;
+        if patch.second_half == Some(sample) {
             parts[0] = parts[1];
         }
         let part =
-            if self.second_half.is_some() { &mut parts[1] } else { &mut parts[sample as usize % count] };
-        self.rays += path.rays;
+            if patch.second_half.is_some() { &mut parts[1] } else { &mut parts[sample as usize % count] };
         let r = path.radiance;
         if !r.is_finite() || r.r < 0.0 || r.g < 0.0 || r.b < 0.0 {
             self.bad_count += 1;
@@ -158,17 +236,21 @@ impl Tile {
         }
     }
 
-    /// Each pixel has got `samples` of them: judges whether that is enough. The result is how many more the settings would have allowed
+    /// Each pixel has got the samples of a level: judges whether that is enough. The result is how many more the settings would have allowed
     /// all pixels together.
-    pub(super) fn end(&mut self, settings: &RenderSettings, samples: u32, lit: &LightImage) -> u64 {
+    pub(super) fn end(&mut self, settings: &RenderSettings, level: Level, lit: &LightImage) -> u64 {
+        let samples = level.samples;
         self.samples = samples;
+        for patch in &mut self.patches {
+            patch.samples = patch.goal;
+        }
         let is_good = |goal: f32| samples >= FEWEST_JUDGED && self.error(lit) <= f64::from(goal);
-        self.is_finished = samples == settings.spp || settings.error.is_some_and(is_good);
+        self.is_finished = level.is_last || settings.error.is_some_and(is_good);
         if !self.is_finished {
             return 0;
         }
         self.settle(lit);
-        u64::from(settings.spp - samples) * self.area()
+        u64::from(settings.spp.saturating_sub(samples)) * self.area()
     }
 
     /// Columns and rows of its pixels.
@@ -191,7 +273,7 @@ impl Tile {
 
     fn so_far(&self, lit: &LightImage) -> impl Iterator<Item = Pixel> {
         let count = (self.parts.len() / self.sums.len().max(1)).max(1);
-        let is_halved = self.second_half.is_some();
+        let is_halved = self.is_halved;
         let of_camera = self.sums.iter().zip(self.parts.chunks(count));
         self.places().zip(of_camera).map(move |((x, y), (sums, parts))| {
             let apart = (0..count).map(|i| if is_halved && i == 1 { parts[1] - parts[0] } else { parts[i] });
@@ -212,12 +294,59 @@ impl Tile {
     /// The error that is expected of the tile, as `bench` measures it: the mean over pixels and channels of the variance over the
     /// square plus 0.01. The few parts of a single pixel tell little, those of all pixels together enough.
     fn error(&self, lit: &LightImage) -> f64 {
-        let of_pixel = |p: Pixel| {
-            let (mean, variance) = (p.beauty.to_array(), p.variance.to_array());
-            let of_channel = |(m, v): (f32, f32)| relative_square(f64::from(v), f64::from(m));
-            mean.into_iter().zip(variance).map(of_channel).sum::<f64>() / 3.0
+        self.so_far(lit).map(Pixel::error).sum::<f64>() / self.area() as f64
+    }
+
+    /// What its patches' samples tell, with each one's column and row in the picture.
+    pub(super) fn seen(&self, lit: &LightImage) -> impl Iterator<Item = ((u32, u32), Seen)> {
+        let mut sums = [(0u32, 0.0); (PATCHES * PATCHES) as usize];
+        for (place, pixel) in self.places().zip(self.so_far(lit)) {
+            let (pixels, error) = &mut sums[self.patch(place)];
+            *pixels += 1;
+            *error += pixel.error();
+        }
+        let with_pixels = (0..).zip(sums).zip(&self.patches).filter(|((_, (pixels, _)), _)| *pixels > 0);
+        with_pixels.map(|((index, (pixels, error)), patch)| {
+            let (pixels, samples) = (f64::from(pixels), f64::from(patch.samples));
+            (
+                self.in_picture(index),
+                Seen { noise: error / pixels, rays: patch.rays as f64 / (pixels * samples) },
+            )
+        })
+    }
+
+    /// The column and row of one of its patches in the picture.
+    fn in_picture(&self, patch: u32) -> (u32, u32) {
+        (self.x0 / PATCH + patch % PATCHES, self.y0 / PATCH + patch / PATCHES)
+    }
+
+    /// Rays of all its samples.
+    pub(super) fn rays(&self) -> u64 {
+        self.patches.iter().map(|patch| patch.rays).sum()
+    }
+
+    /// All its samples.
+    pub(super) fn paths(&self) -> u64 {
+        self.places().map(|place| u64::from(self.patches[self.patch(place)].samples)).sum()
+    }
+
+    /// All samples that its pixels lack of those that are planned.
+    pub(super) fn paths_to(&self, plan: &Plan) -> u64 {
+        let left = |place: (u32, u32)| {
+            let patch = self.patch(place);
+            let planned = plan.samples(self.in_picture(patch as u32));
+            planned.unwrap_or(0).saturating_sub(self.patches[patch].samples)
         };
-        self.so_far(lit).map(of_pixel).sum::<f64>() / self.area() as f64
+        self.places().map(|place| u64::from(left(place))).sum()
+    }
+}
+
+impl Pixel {
+    /// The error that is expected of it.
+    fn error(self) -> f64 {
+        let (mean, variance) = (self.beauty.to_array(), self.variance.to_array());
+        let of_channel = |(m, v): (f32, f32)| relative_square(f64::from(v), f64::from(m));
+        mean.into_iter().zip(variance).map(of_channel).sum::<f64>() / 3.0
     }
 }
 
@@ -294,12 +423,10 @@ mod tests {
 
     #[test]
     fn a_render_may_end_at_doubled_numbers_of_samples() {
-        let levels = |replicates, spp| {
-            levels(&RenderSettings { replicates, spp, ..RenderSettings::default() }).collect::<Vec<_>>()
-        };
+        let levels = |parts, spp| doubled(parts, spp).collect::<Vec<_>>();
         assert_eq!(levels(4, 50), [4, 8, 16, 32, 50]);
         assert_eq!(levels(4, 64), [4, 8, 16, 32, 64]);
-        assert_eq!(levels(1, 50), [2, 4, 8, 16, 32, 50]);
+        assert_eq!(levels(2, 50), [2, 4, 8, 16, 32, 50]);
         assert_eq!(levels(1, 1), [1]);
         // Where a single replicate is halved, a render that doubles has stood.
         for (samples, second) in [(2, 1), (3, 2), (4, 2), (50, 32), (64, 32), (65, 64)] {

@@ -88,7 +88,7 @@ impl<'a> Variants<'a> {
         let (width, height) = first.size();
         let bytes = u64::from(width)
             * u64::from(height)
-            * (tile::bytes_a_pixel(&first.settings) + light_image::bytes_a_pixel(first));
+            * (tile::bytes_a_pixel(first) + light_image::bytes_a_pixel(first));
         usize::try_from(MOST_MEMORY / bytes.max(1)).unwrap_or(MOST).clamp(1, MOST)
     }
 
@@ -251,6 +251,7 @@ fn differ_in_materials_alone(a: &Prepared, b: &Prepared) -> bool {
         && a.light_paths.is_ok() == b.light_paths.is_ok()
         && a.path_reuse.as_ref().ok() == b.path_reuse.as_ref().ok()
         && a.splitting.is_ok() == b.splitting.is_ok()
+        && a.adaptive.is_ok() == b.adaptive.is_ok()
         && a.camera_medium == b.camera_medium
         && from.materials.len() == to.materials.len()
         && from.instances == to.instances

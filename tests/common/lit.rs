@@ -271,3 +271,32 @@ pub(crate) fn assert_same_on_any_threads(world: &Arc<Scene>, settings: &RenderSe
         assert_eq!(one.counts, many.counts);
     }
 }
+
+/// A ball in the open, of which the picture shows mostly the sky.
+pub(crate) fn open(radius: f32) -> Scene {
+    let mut world = scene(vec![(ball(radius, Vec3::Y), lambert(0.6))], camera());
+    set_sky(
+        &mut world,
+        [8, 4],
+        (0..32).map(|i| if i == 11 { 6.0 } else { 0.2 + 0.01 * (i % 5) as f32 }).collect(),
+    );
+    world
+}
+
+/// The error of four renders relative to a long one, and the rays that they take.
+pub(crate) fn error_and_rays(
+    world: &Arc<Scene>,
+    settings: &RenderSettings,
+    long: &RenderSettings,
+) -> (f64, f64) {
+    let reference = rendered(world, long).raster.picture().rgb().expect("colour").map(<[f32]>::to_vec);
+    let (mut error, mut rays) = (0.0, 0.0);
+    for seed in 0..4 {
+        let rendered = rendered(world, &RenderSettings { seed, ..settings.clone() });
+        rays += rendered.counts.rays as f64;
+        let picture = rendered.raster.picture().rgb().expect("colour");
+        let values = picture.into_iter().flatten().zip(reference.iter().flatten());
+        error += values.map(|(x, r)| f64::from((x - r) * (x - r)) / f64::from(r * r + 0.01)).sum::<f64>();
+    }
+    (error, rays)
+}

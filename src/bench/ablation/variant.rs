@@ -78,6 +78,11 @@ impl Variant {
                 Change::Without(|techniques| techniques.splitting = false),
             ),
             Self::new(
+                "even samples",
+                "all pixels get equally many",
+                Change::Without(|techniques| techniques.adaptive = false),
+            ),
+            Self::new(
                 "no roulette",
                 "paths go on to the greatest depth",
                 Change::Without(|techniques| techniques.roulette = false),

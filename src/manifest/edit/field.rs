@@ -153,6 +153,7 @@ fields! {
         LightPaths "light_paths": "one of \"auto\", \"always\", \"never\"",
         PathReuse "path_reuse": "one of \"auto\", \"always\", \"never\"",
         Splitting "splitting": "one of \"auto\", \"always\", \"never\"",
+        Adaptive "adaptive": "one of \"auto\", \"always\", \"never\"",
     }
 }
 

@@ -41,6 +41,7 @@ pub(super) fn set(settings: &mut RenderSettings, field: RenderField, value: &Val
         RenderField::LightPaths => settings.light_paths = value::choice(value, Use::from_name)?,
         RenderField::PathReuse => settings.path_reuse = value::choice(value, Use::from_name)?,
         RenderField::Splitting => settings.splitting = value::choice(value, Use::from_name)?,
+        RenderField::Adaptive => settings.adaptive = value::choice(value, Use::from_name)?,
     }
     Ok(())
 }

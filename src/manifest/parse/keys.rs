@@ -71,6 +71,7 @@ pub(in crate::manifest) const HOMES: &[(&str, &[&str])] = &[
             "light_paths",
             "path_reuse",
             "splitting",
+            "adaptive",
         ],
     ),
     ("[sheet]", &["columns", "rows", "cell_width"]),

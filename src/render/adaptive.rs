@@ -1,0 +1,216 @@
+//! More samples where a picture is noisy, fewer where it is not, for as many rays as equal numbers would take.
+//!
+//! Each patch of pixels begins with a part of the samples. How many it goes on to is planned from the noise and the rays of the patches beside
+//! it, never from its own: on a checkerboard, the patches of one colour plan for those of the other. So the number of a pixel's samples knows nothing
+//! of what they find, and their mean stays unbiased, which it would not be if they went on until they agreed (Kirk and Arvo 1991,
+//! "Unbiased Sampling Techniques for Image Synthesis").
+
+use super::tile::Seen;
+use crate::settings::RenderSettings;
+
+/// Patches begin with the samples over this, and none has less.
+const FIRST_PART: u32 = 4;
+/// None has more than so many times the samples.
+const MOST: u32 = 8;
+/// With fewer samples, what patches begin with tells nothing.
+pub(super) const FEWEST_SAMPLES: u32 = 16;
+/// A patch is taken to have this part of the mean noise besides what those beside it show, which may miss what it has.
+const UNKNOWN_NOISE: f64 = 0.02;
+
+/// From one number of samples to the next.
+struct Step {
+    patch: usize,
+    samples: u32,
+    /// All rays that it takes.
+    rays: f64,
+    /// Error that it takes away for a ray.
+    worth: f64,
+}
+
+/// How many samples the pixels of each patch are to have in all.
+pub(super) struct Plan {
+    columns: usize,
+    /// Row by row.
+    samples: Vec<u32>,
+}
+
+/// The patches of a picture, row by row.
+struct Grid {
+    columns: usize,
+    patches: Vec<Seen>,
+}
+
+/// The samples of each pixel with which a render begins.
+pub(super) fn first_samples(settings: &RenderSettings) -> u32 {
+    settings.spp / FIRST_PART
+}
+
+/// The other numbers of samples that a pixel may have, from the least to the most.
+pub(super) fn later_samples(settings: &RenderSettings) -> impl Iterator<Item = u32> + use<> {
+    let (spp, most) = (settings.spp, settings.spp.saturating_mul(MOST));
+    std::iter::successors(Some(spp / 2), move |&n| {
+        (n < most).then(|| if n < spp { spp } else { n.saturating_mul(2) })
+    })
+}
+
+impl Plan {
+    /// For a picture of so many columns and rows of patches, of each of which something was `seen`.
+    pub(super) fn new(
+        (columns, rows): (u32, u32),
+        seen: impl Iterator<Item = ((u32, u32), Seen)>,
+        settings: &RenderSettings,
+    ) -> Self {
+        let columns = columns as usize;
+        let mut grid = Grid { columns, patches: vec![Seen::default(); columns * rows as usize] };
+        for ((column, row), seen) in seen {
+            grid.patches[row as usize * columns + column as usize] = seen;
+        }
+        let mut samples = vec![settings.spp; grid.patches.len()];
+        for colour in [0, 1] {
+            let patches = (0..grid.patches.len()).filter(|&patch| grid.colour(patch) == colour);
+            let planned = patches.filter_map(|patch| Some((patch, grid.seen_beside(patch)?)));
+            let (places, expected): (Vec<usize>, Vec<Seen>) = planned.unzip();
+            for (patch, shared) in places.into_iter().zip(shared_out(settings, &expected)) {
+                samples[patch] = shared;
+            }
+        }
+        Self { columns, samples }
+    }
+
+    /// Those of the patch in a column and a row, if it is in the picture.
+    pub(super) fn samples(&self, (column, row): (u32, u32)) -> Option<u32> {
+        let (column, row) = (column as usize, row as usize);
+        self.samples.get(row * self.columns + column).copied().filter(|_| column < self.columns)
+    }
+}
+
+impl Grid {
+    fn colour(&self, patch: usize) -> usize {
+        (patch % self.columns + patch / self.columns) % 2
+    }
+
+    /// What those beside a patch have seen on average, all of the other colour; none if it is alone.
+    fn seen_beside(&self, patch: usize) -> Option<Seen> {
+        let column = patch % self.columns;
+        let left = patch.checked_sub(1).filter(|_| column > 0);
+        let right = Some(patch + 1).filter(|_| column + 1 < self.columns);
+        let (above, below) = (patch.checked_sub(self.columns), Some(patch + self.columns));
+        let beside = [left, right, above, below].into_iter().flatten();
+        let (mut sum, mut count) = (Seen::default(), 0.0);
+        for seen in beside.filter_map(|patch| self.patches.get(patch)) {
+            sum = Seen { noise: sum.noise + seen.noise, rays: sum.rays + seen.rays };
+            count += 1.0;
+        }
+        (count > 0.0).then(|| Seen { noise: sum.noise / count, rays: sum.rays / count })
+    }
+}
+
+/// The samples of patches from which such noise is expected: those go on first of which that takes away the most error for a ray, as long
+/// as all together take no more rays than with equal numbers.
+fn shared_out(settings: &RenderSettings, expected: &[Seen]) -> Vec<u32> {
+    let mean_noise = expected.iter().map(|seen| seen.noise).sum::<f64>() / expected.len().max(1) as f64;
+    if mean_noise <= 0.0 {
+        return vec![settings.spp; expected.len()];
+    }
+    let choices: Vec<u32> = [first_samples(settings)].into_iter().chain(later_samples(settings)).collect();
+    let mut steps = Vec::new();
+    for (patch, seen) in expected.iter().enumerate() {
+        // Of n samples, the error is noise/n.
+        let noise = seen.noise + UNKNOWN_NOISE * mean_noise;
+        for pair in choices.windows(2) {
+            let (from, to) = (f64::from(pair[0]), f64::from(pair[1]));
+            let rays = seen.rays * (to - from);
+            steps.push(Step { patch, samples: pair[1], rays, worth: noise * (1.0 / from - 1.0 / to) / rays });
+        }
+    }
+    // Each step of a patch is worth less than the one before.
+    steps.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    let rays_a_sample: f64 = expected.iter().map(|seen| seen.rays).sum();
+    let mut rays_left = rays_a_sample * f64::from(settings.spp - choices[0]) * (1.0 + 1e-9);
+    let mut plan = vec![choices[0]; expected.len()];
+    for Step { patch, samples, rays, .. } in steps {
+        rays_left -= rays;
+        if rays_left < 0.0 {
+            break;
+        }
+        plan[patch] = samples;
+    }
+    plan
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn settings(spp: u32) -> RenderSettings {
+        RenderSettings { spp, ..RenderSettings::default() }
+    }
+
+    fn plan(columns: u32, patches: &[Seen], spp: u32) -> Plan {
+        let places = (0..).map(|i: u32| (i % columns, i / columns));
+        let rows = patches.len() as u32 / columns;
+        Plan::new((columns, rows), places.zip(patches.iter().copied()), &settings(spp))
+    }
+
+    fn patch() -> impl Strategy<Value = Seen> {
+        (prop_oneof![Just(0.0), 1e-6..10.0], 1.0..20.0).prop_map(|(noise, rays)| Seen { noise, rays })
+    }
+
+    proptest! {
+        #[test]
+        fn what_a_patch_has_seen_does_not_tell_its_own_samples(
+            patches in prop::collection::vec(patch(), 35),
+            others in prop::collection::vec(patch(), 35),
+            spp in 16..200u32,
+        ) {
+            // In odd columns and rows, colours alternate all along.
+            let colour = |index: usize| (index % 7 + index / 7) % 2;
+            let mixed = |changed: usize| {
+                let choose = |(i, (a, b)): (usize, (&Seen, &Seen))| if colour(i) == changed { *b } else { *a };
+                patches.iter().zip(&others).enumerate().map(choose).collect::<Vec<_>>()
+            };
+            let before = plan(7, &patches, spp);
+            for changed in [0, 1] {
+                let after = plan(7, &mixed(changed), spp);
+                for i in (0..35).filter(|&i| colour(i) == changed) {
+                    prop_assert_eq!(before.samples[i], after.samples[i]);
+                }
+            }
+        }
+
+        #[test]
+        fn plans_take_no_more_rays_than_equal_numbers_and_leave_less_error(
+            expected in prop::collection::vec(patch(), 1..60),
+            spp in 16..200u32,
+        ) {
+            let plan = shared_out(&settings(spp), &expected);
+            let rays: f64 = expected.iter().zip(&plan).map(|(seen, &n)| seen.rays * f64::from(n)).sum();
+            let all: f64 = expected.iter().map(|seen| seen.rays * f64::from(spp)).sum();
+            prop_assert!(rays <= all * (1.0 + 1e-6));
+            let choices: Vec<u32> = later_samples(&settings(spp)).chain([first_samples(&settings(spp))]).collect();
+            prop_assert!(plan.iter().all(|n| choices.contains(n)), "{:?}", plan);
+        }
+    }
+
+    #[test]
+    fn equal_noise_gets_equal_samples_and_sixteen_times_the_noise_up_to_four_times_as_many() {
+        let even = [Seen { noise: 0.3, rays: 5.0 }; 24];
+        assert!(plan(6, &even, 64).samples.iter().all(|&n| n == 64));
+        // With 128 and 32 samples they take seven eighths of the rays; for those that are left some of the quiet ones go on.
+        let noise = |i: usize| if i < 16 { 1.0 } else { 1.0 / 16.0 };
+        let expected: Vec<Seen> = (0..64).map(|i| Seen { noise: noise(i), rays: 3.0 }).collect();
+        let plan = shared_out(&settings(64), &expected);
+        assert!(plan[..16].iter().all(|&n| n == 128), "{plan:?}");
+        let of = |number: u32| plan[16..].iter().filter(|&&n| n == number).count();
+        assert_eq!((of(32), of(64)), (32, 16), "{plan:?}");
+    }
+
+    #[test]
+    fn numbers_of_samples_are_doubled_from_a_quarter_to_eight_times() {
+        let numbers = |spp| later_samples(&settings(spp)).collect::<Vec<_>>();
+        assert_eq!((first_samples(&settings(64)), numbers(64)), (16, vec![32, 64, 128, 256, 512]));
+        assert_eq!((first_samples(&settings(50)), numbers(50)), (12, vec![25, 50, 100, 200, 400]));
+    }
+}

@@ -1,0 +1,176 @@
+//! Noisy parts of a picture get more samples than others: pictures have the same mean, and less noise for as many rays.
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use common::lit::{
+    assert_same_means, assert_same_on_any_threads, bottled, covered, dull, error_and_rays, lamp, leaning,
+    open, prepared, rendered, shiny,
+};
+use common::{lambert, metal, scene, small};
+use glam::Vec3;
+use pipeline::render::{Rendered, replay};
+use pipeline::scene::Scene;
+use pipeline::settings::{Filter, Integrator, RenderSettings, Use};
+
+/// Without other techniques.
+fn plain(spp: u32) -> RenderSettings {
+    let never = Use::Never;
+    RenderSettings {
+        light_paths: never,
+        path_reuse: never,
+        splitting: never,
+        adaptive: never,
+        ..small(32, 24, spp, 5)
+    }
+}
+
+fn planned(settings: RenderSettings) -> RenderSettings {
+    RenderSettings { adaptive: Use::Always, ..settings }
+}
+
+fn samples(rendered: &Rendered) -> Vec<u32> {
+    let data = rendered.raster.layer("data").expect("data");
+    data.channel("samples").expect("samples").values.iter().map(|&n| n as u32).collect()
+}
+
+/// The fewest samples make the noisiest plans: were they planned by what they find themselves, the mean would be off.
+#[test]
+fn with_and_without_plans_every_part_of_a_picture_has_the_same_mean() {
+    for (what, world, filter) in [
+        ("open", open(0.5), Filter::Box),
+        ("dull", dull(), Filter::Box),
+        ("shiny", shiny(), Filter::Tent),
+        ("bottled", bottled(), Filter::Box),
+        ("covered", covered(), Filter::BlackmanHarris),
+    ] {
+        let world = Arc::new(world);
+        for other in [Use::Never, Use::Always] {
+            let others =
+                RenderSettings { light_paths: other, path_reuse: other, splitting: other, ..plain(128) };
+            let without = RenderSettings { filter, ..others };
+            let with = planned(RenderSettings { spp: 96, ..without.clone() });
+            assert_same_means(&format!("{what}, others {other:?}"), &world, &with, &without);
+        }
+    }
+}
+
+/// Thousands of short renders of what few paths find: the mean of each is known to a part in a hundred. A patch that went on as long as its own
+/// samples disagree would have some percent less.
+#[test]
+fn rare_light_is_not_lost_by_plans() {
+    let mut parts = vec![(common::square(2.0, 0.0), lambert(0.6)), lamp()];
+    parts.push((common::lit::ball(0.5, Vec3::new(-0.5, 0.5, 0.0)), metal(0.15)));
+    let world = Arc::new(scene(parts, common::lit::camera()));
+    let total = |settings: &RenderSettings, seeds: std::ops::Range<u64>| {
+        let totals =
+            seeds.map(|seed| common::mean(&rendered(&world, &RenderSettings { seed, ..settings.clone() })));
+        let totals: Vec<f64> = totals.collect();
+        let n = totals.len() as f64;
+        let mean = totals.iter().sum::<f64>() / n;
+        let variance = totals.iter().map(|t| (t - mean) * (t - mean)).sum::<f64>() / (n * (n - 1.0));
+        (mean, variance)
+    };
+    let short = planned(RenderSettings { width: Some(16), height: Some(12), ..plain(16) });
+    let even = RenderSettings { width: Some(16), height: Some(12), ..plain(512) };
+    let ((a, va), (b, vb)) = (total(&short, 0..2000), total(&even, 10_000..10_100));
+    let sigma = (va + vb).sqrt();
+    assert!(sigma < 0.004 * b, "or the test could not fail: {b} ± {sigma}");
+    assert!((a - b).abs() < 3.5 * sigma, "{a} {b} ± {sigma}");
+}
+
+#[test]
+fn plans_have_the_same_bits_on_any_number_of_threads() {
+    let world = Arc::new(shiny());
+    for other in [Use::Never, Use::Always] {
+        let settings =
+            RenderSettings { light_paths: other, path_reuse: other, splitting: other, ..plain(33) };
+        assert_same_on_any_threads(&world, &planned(settings));
+    }
+}
+
+/// A pixel's samples can be told again, however many there are.
+#[test]
+fn replayed_samples_have_the_mean_that_the_picture_has() {
+    for (world, path_reuse) in [(shiny(), Use::Never), (shiny(), Use::Always), (leaning(), Use::Never)] {
+        let settings = planned(RenderSettings { path_reuse, ..plain(16) });
+        let picture = rendered(&Arc::new(world.clone()), &settings);
+        let counts = samples(&picture);
+        let green = &picture.raster.picture().rgb().expect("colour")[1];
+        let scene = prepared(&world, &settings);
+        let mut numbers = BTreeSet::new();
+        for pixel in (0..32 * 24).step_by(23) {
+            let (x, y, count) = (pixel % 32, pixel / 32, counts[pixel as usize]);
+            let sum: f64 = (0..count).map(|sample| f64::from(replay(&scene, x, y, sample).radiance.g)).sum();
+            let (mean, found) = (sum / f64::from(count), f64::from(green[pixel as usize]));
+            assert!((mean - found).abs() < 1e-6 * (1.0 + found), "{x}, {y}: {mean} {found}");
+            numbers.insert(count);
+        }
+        assert!(numbers.len() > 2, "{numbers:?}");
+    }
+}
+
+/// Within a quarter and eight times the settings' samples, by twos, for about as many rays.
+#[test]
+fn in_the_open_plans_take_noise_away_for_as_many_rays() {
+    let world = Arc::new(open(0.5));
+    let even = RenderSettings { width: Some(64), height: Some(48), ..plain(32) };
+    let long = RenderSettings { seed: 99, spp: 2048, ..even.clone() };
+    let with = planned(even.clone());
+    let of = |settings: &RenderSettings| error_and_rays(&world, settings, &long);
+    let ((error, rays), (before, rays_before)) = (of(&with), of(&even));
+    assert!(error < 0.6 * before && error > 0.05 * before, "{error} {before}");
+    assert!(rays < 1.05 * rays_before && rays > 0.8 * rays_before, "{rays} {rays_before}");
+    let picture = rendered(&world, &with);
+    let numbers = samples(&picture);
+    assert!(numbers.iter().all(|n| [8, 16, 32, 64, 128, 256].contains(n)));
+    assert_eq!(numbers.iter().map(|&n| u64::from(n)).sum::<u64>(), picture.counts.paths);
+    let (sky, ball) = (numbers[0], numbers[24 * 64 + 32]);
+    assert!(sky == 8 && ball > 32, "{sky} {ball}");
+}
+
+#[test]
+fn where_nothing_is_noisy_all_pixels_have_as_many_samples() {
+    let mut world = scene(vec![(common::cube(0.5), lambert(0.0))], common::lit::camera());
+    world.lights.clear();
+    world.environment = None;
+    let picture = rendered(&Arc::new(world), &planned(plain(16)));
+    assert!(samples(&picture).iter().all(|&n| n == 16));
+}
+
+fn why_not(world: &Scene, settings: &RenderSettings) -> Option<String> {
+    let prepared = prepared(world, settings);
+    let told = prepared.skipped().into_iter().find(|line| line.starts_with("more samples where it is noisy"));
+    assert_eq!(told.is_none(), prepared.is_adaptive());
+    assert_eq!(prepared.most_samples() > settings.spp, prepared.is_adaptive());
+    told
+}
+
+/// Whatever the seed, and whatever the number of samples.
+#[test]
+fn samples_are_planned_where_much_of_the_picture_is_sky() {
+    for seed in 0..8 {
+        let settings = RenderSettings { seed, ..small(240, 180, 16 << (seed % 4), 6) };
+        assert_eq!(why_not(&open(0.5), &settings), None, "{seed}");
+        let why = why_not(&dull(), &settings).unwrap_or_default();
+        assert!(why.contains("of the picture"), "{seed}: {why}");
+    }
+}
+
+#[test]
+fn what_keeps_samples_from_being_planned_is_told() {
+    let usual = planned(plain(16));
+    let cases = [
+        (RenderSettings { adaptive: Use::Never, ..usual.clone() }, "the settings ask for none"),
+        (RenderSettings { integrator: Integrator::Normals, ..usual.clone() }, "no paths are traced"),
+        (RenderSettings { error: Some(0.01), ..usual.clone() }, "until the error is small enough"),
+        (RenderSettings { spp: 15, ..usual.clone() }, "so few samples"),
+    ];
+    for (settings, expected) in cases {
+        let why = why_not(&dull(), &settings).expect("a reason");
+        assert!(why.contains(expected), "{why}: {expected}");
+    }
+    assert_eq!(why_not(&dull(), &usual), None);
+}
