@@ -154,8 +154,14 @@ fn samples_are_planned_where_much_of_the_picture_is_sky() {
     for seed in 0..8 {
         let settings = RenderSettings { seed, ..small(240, 180, 16 << (seed % 4), 6) };
         assert_eq!(why_not(&open(0.5), &settings), None, "{seed}");
-        let why = why_not(&dull(), &settings).unwrap_or_default();
+        let alone = RenderSettings { path_reuse: Use::Never, ..settings.clone() };
+        let why = why_not(&dull(), &alone).unwrap_or_default();
         assert!(why.contains("of the picture"), "{seed}: {why}");
+        // Where neighbours see alike, large blocks are better, unless plans are asked for.
+        let why = why_not(&dull(), &settings).unwrap_or_default();
+        assert!(why.contains("pixels of large blocks"), "{seed}: {why}");
+        let asked = prepared(&dull(), &planned(settings));
+        assert_eq!((asked.is_adaptive(), asked.reuse_block()), (true, Some((2, 2))), "{seed}");
     }
 }
 

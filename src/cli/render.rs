@@ -49,7 +49,7 @@ pub(super) struct Arguments {
     /// render.FIELD, import.FIELD, convert.FIELD.
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
     set: Vec<Override>,
-    /// Samples a pixel.
+    /// Samples a pixel. Where much of the picture is sky, noisy parts get more and others fewer, for as many rays (`render.adaptive`).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16_777_216))]
     spp: Option<u32>,
     /// The error at which to stop, as `pipeline bench` measures it: 0.01 is 10% noise. --spp is then the most samples there may be,

@@ -179,14 +179,17 @@ impl Worth {
     }
 
     /// Whether noisy parts of the picture should get more samples, or why not.
-    fn adaptive(&self) -> Result<(), String> {
-        let full = 100.0 * (1.0 - self.unmet);
-        let why = || {
-            format!(
+    fn adaptive(&self, used: Used) -> Result<(), String> {
+        if used.path_reuse == Some(BlockSize::Eight) {
+            Err("pixels of large blocks, which have equal numbers, use each other's paths".to_owned())
+        } else if self.unmet < LEAST_UNMET {
+            let full = 100.0 * (1.0 - self.unmet);
+            Err(format!(
                 "surfaces fill {full:.0}% of the picture, and pixels with equal numbers complete each other"
-            )
-        };
-        if self.unmet < LEAST_UNMET { Err(why()) } else { Ok(()) }
+            ))
+        } else {
+            Ok(())
+        }
     }
 
     /// What a technique that `with` has and `without` has not would bring.
@@ -216,12 +219,9 @@ pub(super) fn choose(scene: &Prepared, can_reuse: bool, can_split: bool) -> Choi
         if with { is_possible } else { is_open || !is_possible }
     };
     let with_light = [false, true].into_iter().filter(|&with| may_be(light_is_open, can_light, with));
-    if adaptive_is_open {
-        choice.adaptive = worth.adaptive();
-    }
     let sizes = [None, Some(BlockSize::Four), Some(BlockSize::Eight)];
-    // Pixels of a block have equal numbers of samples.
-    let is_adaptive = scene.adaptive.is_ok() && choice.adaptive.is_ok();
+    // Pixels of a block have equal numbers of samples, and those of large ones would have too many.
+    let is_adaptive = scene.adaptive.is_ok() && !adaptive_is_open;
     let sizes = sizes.into_iter().filter(|&size| !(is_adaptive && size == Some(BlockSize::Eight)));
     let with_reuse = sizes.filter(|size| may_be(reuse_is_open, can_reuse, size.is_some()));
     let ways = with_light
@@ -235,6 +235,9 @@ pub(super) fn choose(scene: &Prepared, can_reuse: bool, can_split: bool) -> Choi
         let with = Used { path_reuse: Some(BlockSize::Four), ..best };
         format!("it {}", worth.told(with, best))
     });
+    if adaptive_is_open {
+        choice.adaptive = worth.adaptive(best);
+    }
     if splitting_is_open {
         choice.splitting = worth.splitting(best);
     }
