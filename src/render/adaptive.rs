@@ -5,6 +5,8 @@
 //! of what they find, and their mean stays unbiased, which it would not be if they went on until they agreed (Kirk and Arvo 1991,
 //! "Unbiased Sampling Techniques for Image Synthesis").
 
+use rayon::prelude::*;
+
 use super::tile::Seen;
 use crate::settings::RenderSettings;
 
@@ -17,14 +19,13 @@ pub(super) const FEWEST_SAMPLES: u32 = 16;
 /// A patch is taken to have this part of the mean noise besides what those beside it show, which may miss what it has.
 const UNKNOWN_NOISE: f64 = 0.02;
 
-/// From one number of samples to the next.
+/// From one number of samples to the next; small, as there are five for each patch.
 struct Step {
-    patch: usize,
-    samples: u32,
-    /// All rays that it takes.
-    rays: f64,
     /// Error that it takes away for a ray.
     worth: f64,
+    patch: u32,
+    /// The place of the next number.
+    next: u32,
 }
 
 /// How many samples the pixels of each patch are to have in all.
@@ -114,26 +115,29 @@ fn shared_out(settings: &RenderSettings, expected: &[Seen]) -> Vec<u32> {
     }
     let choices: Vec<u32> = [first_samples(settings)].into_iter().chain(later_samples(settings)).collect();
     let mut steps = Vec::new();
-    for (patch, seen) in expected.iter().enumerate() {
+    let rays = |seen: &Seen, next: usize| seen.rays * f64::from(choices[next] - choices[next - 1]);
+    for (patch, seen) in (0..).zip(expected) {
         // Of n samples, the error is noise/n.
         let noise = seen.noise + UNKNOWN_NOISE * mean_noise;
-        for pair in choices.windows(2) {
-            let (from, to) = (f64::from(pair[0]), f64::from(pair[1]));
-            let rays = seen.rays * (to - from);
-            steps.push(Step { patch, samples: pair[1], rays, worth: noise * (1.0 / from - 1.0 / to) / rays });
+        for next in 1..choices.len() {
+            let gain = noise * (1.0 / f64::from(choices[next - 1]) - 1.0 / f64::from(choices[next]));
+            steps.push(Step { worth: gain / rays(seen, next), patch, next: next as u32 });
         }
     }
     // Each step of a patch is worth less than the one before.
-    steps.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    steps.par_sort_unstable_by(|a, b| {
+        b.worth.total_cmp(&a.worth).then_with(|| (a.patch, a.next).cmp(&(b.patch, b.next)))
+    });
     let rays_a_sample: f64 = expected.iter().map(|seen| seen.rays).sum();
     let mut rays_left = rays_a_sample * f64::from(settings.spp - choices[0]) * (1.0 + 1e-9);
     let mut plan = vec![choices[0]; expected.len()];
-    for Step { patch, samples, rays, .. } in steps {
-        rays_left -= rays;
+    for Step { patch, next, .. } in steps {
+        let (patch, next) = (patch as usize, next as usize);
+        rays_left -= rays(&expected[patch], next);
         if rays_left < 0.0 {
             break;
         }
-        plan[patch] = samples;
+        plan[patch] = choices[next];
     }
     plan
 }
