@@ -100,6 +100,8 @@ struct Turn {
     seconds: f64,
     error: f64,
     bits: blake3::Hash,
+    /// Samples of all pixels.
+    paths: u64,
 }
 
 impl Contest<'_> {
@@ -134,7 +136,7 @@ impl Contest<'_> {
         let what = format!("{}: {}, {samples} samples", self.subject.job.name, variant.name());
         let (rendered, seconds) = timed(&scene, &what, watch)?;
         let error = error::deviation(rendered.raster.picture(), self.reference.picture()).error;
-        Ok(Turn { seconds, error, bits: bits(&rendered.raster) })
+        Ok(Turn { seconds, error, bits: bits(&rendered.raster), paths: rendered.counts.paths })
     }
 }
 
@@ -167,7 +169,7 @@ fn row(variant: &Variant, place: usize, rounds: &[Round], levels: &[u32]) -> Row
         error: over_levels(&error_at),
         time: over_levels(&time_at),
         same_bits: pairs().all(|(_, whole, own)| whole.bits == own.bits),
-        must_be_same: variant.must_be_same(),
+        must_be_same: variant.must_be_same(pairs().all(|(_, whole, own)| whole.paths == own.paths)),
         name: variant.name().to_owned(),
         what: variant.what(),
     }
@@ -179,7 +181,7 @@ mod tests {
     use crate::settings::RenderSettings;
 
     fn turn(seconds: f64, error: f64, bits: &[u8]) -> Turn {
-        Turn { seconds, error, bits: blake3::hash(bits) }
+        Turn { seconds, error, bits: blake3::hash(bits), paths: 1 }
     }
 
     /// Two levels, three rounds each: a variant of twice the error at both, half the time at one and a quarter at the other.

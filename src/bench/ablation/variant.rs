@@ -14,6 +14,8 @@ enum Change {
     Without(fn(&mut Techniques)),
     /// One that saves work alone.
     WithoutSaving(fn(&mut Techniques)),
+    /// One that saves rays, by which uneven samples are planned.
+    WithoutSavingRays(fn(&mut Techniques)),
     PortableKernel,
 }
 
@@ -108,7 +110,7 @@ impl Variant {
             Self::new(
                 "useless light",
                 "light is sampled on mirrors, and shadow rays are traced for light that is black",
-                Change::WithoutSaving(|techniques| techniques.useful_light = false),
+                Change::WithoutSavingRays(|techniques| techniques.useful_light = false),
             ),
         ]);
         if Kernel::avx2().is_some() {
@@ -125,9 +127,13 @@ impl Variant {
         self.what
     }
 
-    /// Whether its pictures have the same bits as the whole renderer's.
-    pub(super) fn must_be_same(&self) -> bool {
-        matches!(self.change, Change::Nothing | Change::WithoutSaving(_) | Change::PortableKernel)
+    /// Whether its pictures have the same bits as the whole renderer's, given whether they have as many samples.
+    pub(super) fn must_be_same(&self, has_as_many_samples: bool) -> bool {
+        match self.change {
+            Change::Nothing | Change::WithoutSaving(_) | Change::PortableKernel => true,
+            Change::WithoutSavingRays(_) => has_as_many_samples,
+            Change::Settings(_) | Change::Replicates(_) | Change::Without(_) => false,
+        }
     }
 
     pub(super) fn is_portable(&self) -> bool {
@@ -136,7 +142,10 @@ impl Variant {
 
     pub(super) fn techniques(&self) -> Techniques {
         let mut techniques = Techniques::default();
-        if let Change::Without(leave_out) | Change::WithoutSaving(leave_out) = self.change {
+        if let Change::Without(leave_out)
+        | Change::WithoutSaving(leave_out)
+        | Change::WithoutSavingRays(leave_out) = self.change
+        {
             leave_out(&mut techniques);
         }
         techniques
