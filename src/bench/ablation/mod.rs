@@ -219,5 +219,10 @@ mod tests {
         let wrong = variants.iter().filter(|variant| row(variant, 1, &rounds(b"b"), &[4, 16]).is_wrong());
         let names: Vec<&str> = wrong.map(Variant::name).filter(|&name| name != "no avx2").collect();
         assert_eq!(names, ["whole", "whole, again", "no constants", "no coverage", "useless light"]);
+        // But where other rays made another plan of samples.
+        let mut otherwise = rounds(b"b");
+        otherwise.iter_mut().for_each(|round| round.turns[1].paths += 1);
+        let wrong = variants.iter().filter(|variant| row(variant, 1, &otherwise, &[4, 16]).is_wrong());
+        assert!(wrong.map(Variant::name).all(|name| name != "useless light"));
     }
 }
