@@ -353,9 +353,14 @@ fn light_paths(
         (filter.radius() > 0.0, "the filter is a point"),
         (sums <= MOST_SUMS, "there are too many replicates for so many pixels"),
     ];
+    all_given(needed).map(|()| LightPaths { per_sample: pixels.div_ceil(PIXELS_PER_PATH) })
+}
+
+/// Everything that is needed is given, or why the first of the rest is missed.
+fn all_given<const N: usize>(needed: [(bool, &str); N]) -> Result<(), String> {
     match needed.into_iter().find(|(is_given, _)| !is_given) {
         Some((_, why)) => Err(why.to_owned()),
-        None => Ok(LightPaths { per_sample: pixels.div_ceil(PIXELS_PER_PATH) }),
+        None => Ok(()),
     }
 }
 
@@ -367,10 +372,7 @@ fn adaptive(settings: &RenderSettings) -> Result<(), String> {
         (settings.error.is_none(), "samples go on until the error is small enough"),
         (settings.spp >= adaptive::FEWEST_SAMPLES, "with so few samples the first of them tell nothing"),
     ];
-    match needed.into_iter().find(|(is_given, _)| !is_given) {
-        Some((_, why)) => Err(why.to_owned()),
-        None => Ok(()),
-    }
+    all_given(needed)
 }
 
 /// That samples may branch, or why not.
@@ -380,10 +382,7 @@ fn splitting(settings: &RenderSettings) -> Result<(), String> {
         (settings.integrator == Integrator::Path, "no paths go on from the first surface"),
         (settings.max_depth > 0, "no light is scattered"),
     ];
-    match needed.into_iter().find(|(is_given, _)| !is_given) {
-        Some((_, why)) => Err(why.to_owned()),
-        None => Ok(()),
-    }
+    all_given(needed)
 }
 
 /// That neighbouring pixels may use each other's paths, or why not.
@@ -394,10 +393,7 @@ fn path_reuse(settings: &RenderSettings, all_opaque: bool) -> Result<(), String>
         (settings.max_depth > 1, "no light is scattered twice"),
         (all_opaque, "some surface lets light go straight through"),
     ];
-    match needed.into_iter().find(|(is_given, _)| !is_given) {
-        Some((_, why)) => Err(why.to_owned()),
-        None => Ok(()),
-    }
+    all_given(needed)
 }
 
 /// What else finds the light that is sampled.
