@@ -31,23 +31,8 @@ impl Distribution {
     /// Probabilities are multiples of 2⁻²⁴, as the random numbers are: then a thing comes exactly as often as
     /// [`Self::probability`] says, however rare.
     pub fn new(weights: &[f64]) -> Self {
-        let total: f64 = weights.iter().copied().filter(|w| *w > 0.0).sum();
-        if !(total > 0.0 && total.is_finite()) {
-            return Self { cumulative: Vec::new(), guide: Vec::new() };
-        }
-        let mut sum = 0.0;
-        let mut cumulative = Vec::with_capacity(weights.len() + 1);
-        cumulative.push(0.0);
-        for w in weights {
-            sum += w.max(0.0);
-            cumulative.push(((sum / total * GRID).round() / GRID) as f32);
-        }
-        // Rounding must not leave a gap below 1: things after the last positive weight stay impossible.
-        let last = cumulative[weights.len()];
-        for c in cumulative.iter_mut().rev().take_while(|c| **c == last) {
-            *c = 1.0;
-        }
-        let guide = guide(&cumulative);
+        let cumulative = cumulative(weights).unwrap_or_default();
+        let guide = if cumulative.is_empty() { Vec::new() } else { guide(&cumulative) };
         Self { cumulative, guide }
     }
 
@@ -72,9 +57,8 @@ impl Distribution {
         };
         let index = from + self.cumulative[from..to].partition_point(|&c| c <= u) - 1;
         let index = index.min(self.cumulative.len() - 2);
-        let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
-        let rest = if high > low { ((u - low) / (high - low)).min(1.0 - f32::EPSILON / 2.0) } else { 0.0 };
-        Some((index, high - low, rest))
+        let (probability, rest) = between(self.cumulative[index], self.cumulative[index + 1], u);
+        Some((index, probability, rest))
     }
 
     /// The probability of a thing; it is exactly that of [`Self::sample`].
@@ -85,6 +69,34 @@ impl Distribution {
             None => 0.0,
         }
     }
+}
+
+/// Cumulative probabilities in proportion to `weights`, one more than these; none if no weight is positive.
+pub(super) fn cumulative(weights: &[f64]) -> Option<Vec<f32>> {
+    let total: f64 = weights.iter().copied().filter(|w| *w > 0.0).sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return None;
+    }
+    let mut sum = 0.0;
+    let mut cumulative = Vec::with_capacity(weights.len() + 1);
+    cumulative.push(0.0);
+    for w in weights {
+        sum += w.max(0.0);
+        cumulative.push(((sum / total * GRID).round() / GRID) as f32);
+    }
+    // Rounding must not leave a gap below 1: things after the last positive weight stay impossible.
+    let last = cumulative[weights.len()];
+    for c in cumulative.iter_mut().rev().take_while(|c| **c == last) {
+        *c = 1.0;
+    }
+    Some(cumulative)
+}
+
+/// The probability of what begins and ends at such cumulative ones, and where between them `u` lies, in [0, 1).
+#[inline]
+pub(super) fn between(low: f32, high: f32, u: f32) -> (f32, f32) {
+    let rest = if high > low { ((u - low) / (high - low)).min(1.0 - f32::EPSILON / 2.0) } else { 0.0 };
+    (high - low, rest)
 }
 
 fn guide(cumulative: &[f32]) -> Vec<u32> {
