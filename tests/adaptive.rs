@@ -9,23 +9,11 @@ use common::lit::{
     assert_same_means, assert_same_on_any_threads, bottled, covered, dull, error_and_rays, lamp, leaning,
     open, prepared, rendered, shiny,
 };
+use common::technique::{ADAPTIVE, assert_not_used, assert_replayed, plain, why_not};
 use common::{lambert, metal, scene, small};
 use glam::Vec3;
-use pipeline::render::{Rendered, replay};
-use pipeline::scene::Scene;
+use pipeline::render::Rendered;
 use pipeline::settings::{Filter, Integrator, RenderSettings, Use};
-
-/// Without other techniques.
-fn plain(spp: u32) -> RenderSettings {
-    let never = Use::Never;
-    RenderSettings {
-        light_paths: never,
-        path_reuse: never,
-        splitting: never,
-        adaptive: never,
-        ..small(32, 24, spp, 5)
-    }
-}
 
 fn planned(settings: RenderSettings) -> RenderSettings {
     RenderSettings { adaptive: Use::Always, ..settings }
@@ -98,14 +86,11 @@ fn replayed_samples_have_the_mean_that_the_picture_has() {
         let settings = planned(RenderSettings { path_reuse, ..plain(16) });
         let picture = rendered(&Arc::new(world.clone()), &settings);
         let counts = samples(&picture);
-        let green = &picture.raster.picture().rgb().expect("colour")[1];
         let scene = prepared(&world, &settings);
         let mut numbers = BTreeSet::new();
         for pixel in (0..32 * 24).step_by(23) {
-            let (x, y, count) = (pixel % 32, pixel / 32, counts[pixel as usize]);
-            let sum: f64 = (0..count).map(|sample| f64::from(replay(&scene, x, y, sample).radiance.g)).sum();
-            let (mean, found) = (sum / f64::from(count), f64::from(green[pixel as usize]));
-            assert!((mean - found).abs() < 1e-6 * (1.0 + found), "{x}, {y}: {mean} {found}");
+            let count = counts[pixel as usize];
+            assert_replayed(&scene, &picture, (pixel % 32, pixel / 32), count);
             numbers.insert(count);
         }
         assert!(numbers.len() > 2, "{numbers:?}");
@@ -140,28 +125,40 @@ fn where_nothing_is_noisy_all_pixels_have_as_many_samples() {
     assert!(samples(&picture).iter().all(|&n| n == 16));
 }
 
-fn why_not(world: &Scene, settings: &RenderSettings) -> Option<String> {
-    let prepared = prepared(world, settings);
-    let told = prepared.skipped().into_iter().find(|line| line.starts_with("more samples where it is noisy"));
-    assert_eq!(told.is_none(), prepared.is_adaptive());
-    assert_eq!(prepared.most_samples() > settings.spp, prepared.is_adaptive());
-    told
-}
-
 /// Whatever the seed, and whatever the number of samples.
 #[test]
 fn samples_are_planned_where_much_of_the_picture_is_sky() {
     for seed in 0..8 {
         let settings = RenderSettings { seed, ..small(240, 180, 16 << (seed % 4), 6) };
-        assert_eq!(why_not(&open(0.5), &settings), None, "{seed}");
+        assert_eq!(why_not(ADAPTIVE, &open(0.5), &settings), None, "{seed}");
+        assert_eq!(prepared(&open(0.5), &settings).most_samples(), 8 * settings.spp);
         let alone = RenderSettings { path_reuse: Use::Never, ..settings.clone() };
-        let why = why_not(&dull(), &alone).unwrap_or_default();
-        assert!(why.contains("of the picture"), "{seed}: {why}");
+        assert_not_used(ADAPTIVE, &dull(), &alone, "of the picture");
         // Where neighbours see alike, large blocks are better, unless plans are asked for.
-        let why = why_not(&dull(), &settings).unwrap_or_default();
-        assert!(why.contains("pixels of large blocks"), "{seed}: {why}");
+        assert_not_used(ADAPTIVE, &dull(), &settings, "pixels of large blocks");
+        assert_eq!(prepared(&dull(), &settings).most_samples(), settings.spp);
         let asked = prepared(&dull(), &planned(settings));
         assert_eq!((asked.is_adaptive(), asked.reuse_block()), (true, Some((2, 2))), "{seed}");
+    }
+}
+
+/// A lamp in a glass ball, of whose light the first samples find too little to tell where it makes noise.
+#[test]
+fn where_light_is_seldom_found_samples_are_not_planned() {
+    let place = Vec3::Y * 1.2;
+    let lamp = (common::lit::ball(0.1, place), common::emitting(lambert(0.0), 50.0));
+    let parts = vec![
+        lamp,
+        (common::lit::ball(0.4, place), common::glass(0.0)),
+        (common::square(1.0, 0.0), lambert(0.7)),
+    ];
+    let lantern = scene(parts, common::lit::camera());
+    for seed in 0..8 {
+        let settings = RenderSettings { seed, ..small(120, 90, 64, 6) };
+        assert_not_used(ADAPTIVE, &lantern, &settings, "paths from the lights");
+        // It is not for want of sky.
+        let alone = RenderSettings { light_paths: Use::Never, path_reuse: Use::Never, ..settings };
+        assert_eq!(why_not(ADAPTIVE, &lantern, &alone), None, "{seed}");
     }
 }
 
@@ -175,8 +172,7 @@ fn what_keeps_samples_from_being_planned_is_told() {
         (RenderSettings { spp: 15, ..usual.clone() }, "so few samples"),
     ];
     for (settings, expected) in cases {
-        let why = why_not(&dull(), &settings).expect("a reason");
-        assert!(why.contains(expected), "{why}: {expected}");
+        assert_not_used(ADAPTIVE, &dull(), &settings, expected);
     }
-    assert_eq!(why_not(&dull(), &usual), None);
+    assert_eq!(why_not(ADAPTIVE, &dull(), &usual), None);
 }

@@ -8,9 +8,8 @@ use common::lit::{
     assert_same_means, assert_same_on_any_threads, camera, clear, dull, leaning, mapped, shiny, submerged,
     sunny, walls,
 };
+use common::technique::{LIGHT_PATHS, assert_not_used, plain, why_not};
 use common::{lambert, scene, small, square};
-use pipeline::render::{Geometry, Prepared};
-use pipeline::scene::Scene;
 use pipeline::scene::studio::add_studio_lighting;
 use pipeline::settings::{Filter, RenderSettings, Use};
 
@@ -24,12 +23,7 @@ fn with_and_without_light_paths_every_part_of_a_picture_has_the_same_mean() {
         ("leaning", leaning(), Filter::Box),
         ("submerged", submerged(), Filter::Box),
     ] {
-        let without = RenderSettings {
-            light_paths: Use::Never,
-            path_reuse: Use::Never,
-            filter,
-            ..small(32, 24, 256, 5)
-        };
+        let without = RenderSettings { filter, ..plain(256) };
         let with = RenderSettings { light_paths: Use::Always, spp: 96, ..without.clone() };
         assert_same_means(what, &Arc::new(world), &with, &without);
     }
@@ -45,22 +39,15 @@ fn light_paths_have_the_same_bits_on_any_number_of_threads() {
     }
 }
 
-fn why_not(world: &Scene, settings: &RenderSettings) -> Option<String> {
-    let world = Arc::new(world.clone());
-    let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
-    let prepared = Prepared::new(world, geometry, settings).expect("prepared");
-    prepared.skipped().into_iter().find(|line| line.starts_with("light paths"))
-}
-
 /// Whatever the seed, and whatever the number of samples.
 #[test]
 fn light_paths_are_used_where_they_pay() {
     let dull = dull();
     for seed in 0..8 {
         let settings = RenderSettings { seed, ..small(80, 60, 1 << (seed % 4), 6) };
-        assert_eq!(why_not(&clear(), &settings), None);
-        let why = why_not(&dull, &settings).expect("nothing shines");
-        assert!(why.starts_with("light paths: they would leave"), "{why}");
+        assert_eq!(why_not(LIGHT_PATHS, &clear(), &settings), None);
+        // Nothing shines.
+        assert_not_used(LIGHT_PATHS, &dull, &settings, "they would leave");
     }
 }
 
@@ -71,8 +58,7 @@ fn light_paths_are_left_out_in_the_open() {
     add_studio_lighting(&mut open);
     for seed in 0..8 {
         let settings = RenderSettings { seed, ..small(80, 60, 16, 6) };
-        let why = why_not(&open, &settings).expect("nothing hides the sky");
-        assert!(why.starts_with("light paths: they would leave"), "{why}");
+        assert_not_used(LIGHT_PATHS, &open, &settings, "they would leave");
     }
 }
 
@@ -92,8 +78,7 @@ fn what_keeps_light_paths_away_is_told() {
         (unlit, usual.clone(), "no surface emits light"),
     ];
     for (world, settings, expected) in cases {
-        let why = why_not(&world, &settings).expect("a reason");
-        assert!(why.contains(expected), "{why}: {expected}");
+        assert_not_used(LIGHT_PATHS, &world, &settings, expected);
     }
-    assert_eq!(why_not(&clear(), &usual), None);
+    assert_eq!(why_not(LIGHT_PATHS, &clear(), &usual), None);
 }

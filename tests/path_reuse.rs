@@ -5,19 +5,14 @@ mod common;
 use std::sync::Arc;
 
 use common::lit::{
-    assert_same_means, assert_same_on_any_threads, ball, bottled, camera, clear, covered, dull, facing, lamp,
-    leaning, prepared, rendered, shiny, sunny, walls,
+    assert_same_means, assert_same_on_any_threads, ball, bottled, camera, clear, covered, dull,
+    error_and_rays, facing, lamp, leaning, prepared, rendered, shiny, sunny, walls,
 };
+use common::technique::{PATH_REUSE, assert_not_used, assert_replayed, plain, why_not};
 use common::{lambert, metal, scene, small};
 use glam::Vec3;
-use pipeline::render::replay;
 use pipeline::scene::{Camera, Scene};
 use pipeline::settings::{Filter, RenderSettings, Use};
-
-/// Without either technique.
-fn plain(spp: u32) -> RenderSettings {
-    RenderSettings { light_paths: Use::Never, path_reuse: Use::Never, ..small(32, 24, spp, 5) }
-}
 
 const SMALL: (u32, u32) = (2, 2);
 const LARGE: (u32, u32) = (4, 2);
@@ -66,35 +61,14 @@ fn replayed_samples_have_the_mean_that_the_picture_has() {
         RenderSettings { path_reuse: Use::Always, ..RenderSettings { width: Some(33), ..plain(16) } };
     let mut blocks = std::collections::BTreeSet::new();
     for world in [dull(), shiny(), bottled(), leaning()] {
-        let beauty = rendered(&Arc::new(world.clone()), &settings)
-            .raster
-            .picture()
-            .rgb()
-            .expect("colour")
-            .map(<[f32]>::to_vec);
+        let picture = rendered(&Arc::new(world.clone()), &settings);
         let scene = prepared(&world, &settings);
         blocks.extend(scene.reuse_block());
-        for (x, y) in [(5, 7), (16, 12), (17, 13), (32, 10), (20, 20)] {
-            let samples = (0..16).map(|sample| replay(&scene, x, y, sample).radiance);
-            let mean = samples.fold(0.0, |sum, radiance| sum + f64::from(radiance.g)) / 16.0;
-            let pixel = f64::from(beauty[1][(y * 33 + x) as usize]);
-            assert!((mean - pixel).abs() < 1e-6 * (1.0 + pixel), "{x}, {y}: {mean} {pixel}");
+        for place in [(5, 7), (16, 12), (17, 13), (32, 10), (20, 20)] {
+            assert_replayed(&scene, &picture, place, 16);
         }
     }
     assert_eq!(Vec::from_iter(blocks), [SMALL, LARGE]);
-}
-
-fn error(world: &Arc<Scene>, settings: &RenderSettings, reference: &[Vec<f32>; 3]) -> f64 {
-    let seeds = 0..4;
-    let picture = |seed| {
-        let rendered = rendered(world, &RenderSettings { seed, ..settings.clone() });
-        rendered.raster.picture().rgb().expect("colour").map(<[f32]>::to_vec)
-    };
-    let squares = |picture: [Vec<f32>; 3]| -> f64 {
-        let values = picture.iter().flatten().zip(reference.iter().flatten());
-        values.map(|(x, r)| f64::from((x - r) * (x - r)) / f64::from(r * r + 0.01)).sum()
-    };
-    seeds.map(|seed| squares(picture(seed))).sum()
 }
 
 #[test]
@@ -103,14 +77,9 @@ fn indirect_light_has_less_than_half_the_error() {
     let without = plain(16);
     let with = RenderSettings { path_reuse: Use::Always, ..without.clone() };
     let long = RenderSettings { seed: 99, ..plain(2048) };
-    let reference = rendered(&world, &long).raster.picture().rgb().expect("colour").map(<[f32]>::to_vec);
-    let (with, without) = (error(&world, &with, &reference), error(&world, &without, &reference));
+    let error = |settings: &RenderSettings| error_and_rays(&world, settings, &long).0;
+    let (with, without) = (error(&with), error(&without));
     assert!(with < 0.6 * without && with > 0.1 * without, "{with} {without}");
-}
-
-fn why_not(world: &Scene, settings: &RenderSettings) -> Option<String> {
-    let skipped = prepared(world, settings).skipped();
-    skipped.into_iter().find(|line| line.starts_with("reuse of paths"))
 }
 
 /// Whatever the seed, and whatever the number of samples.
@@ -120,9 +89,8 @@ fn paths_are_reused_where_it_pays() {
     let open = scene(vec![(common::square(2.0, 0.0), lambert(0.3)), lamp()], camera());
     for seed in 0..8 {
         let settings = RenderSettings { seed, ..small(80, 60, 1 << (seed % 4), 6) };
-        assert_eq!(why_not(&dull(), &settings), None);
-        let why = why_not(&open, &settings).expect("nothing is lit indirectly");
-        assert!(why.contains("it would leave"), "{why}");
+        assert_eq!(why_not(PATH_REUSE, &dull(), &settings), None);
+        assert_not_used(PATH_REUSE, &open, &settings, "it would leave");
     }
 }
 
@@ -154,10 +122,9 @@ fn what_keeps_paths_from_being_reused_is_told() {
         (clear(), usual.clone(), "some surface lets light go straight through"),
     ];
     for (world, settings, expected) in cases {
-        let why = why_not(&world, &settings).expect("a reason");
-        assert!(why.contains(expected), "{why}: {expected}");
+        assert_not_used(PATH_REUSE, &world, &settings, expected);
     }
-    assert_eq!(why_not(&dull(), &usual), None);
+    assert_eq!(why_not(PATH_REUSE, &dull(), &usual), None);
 }
 
 /// A wall stands in the middle of a block, between a lit and a dark half: what is seen from one side of it must not be lit from the other.

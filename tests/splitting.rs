@@ -8,23 +8,10 @@ use common::lit::{
     assert_same_means, assert_same_on_any_threads, ball, bottled, camera, covered, dull, error_and_rays,
     lamp, leaning, open, prepared, rendered, shiny, sunny,
 };
+use common::technique::{SPLITTING, assert_not_used, assert_replayed, plain, why_not};
 use common::{emitting, lambert, scene, set_sky, small};
 use glam::Vec3;
-use pipeline::render::replay;
-use pipeline::scene::Scene;
 use pipeline::settings::{Filter, Integrator, RenderSettings, Use};
-
-/// Without other techniques.
-fn plain(spp: u32) -> RenderSettings {
-    let never = Use::Never;
-    RenderSettings {
-        light_paths: never,
-        path_reuse: never,
-        splitting: never,
-        adaptive: never,
-        ..small(32, 24, spp, 5)
-    }
-}
 
 #[test]
 fn with_and_without_branches_every_part_of_a_picture_has_the_same_mean() {
@@ -66,21 +53,15 @@ fn replayed_samples_have_the_mean_that_the_picture_has() {
         [(shiny(), Use::Never), (shiny(), Use::Always), (leaning(), Use::Never), (open(0.5), Use::Never)]
     {
         let settings = RenderSettings { path_reuse, splitting: Use::Always, ..plain(16) };
-        let picture = rendered(&Arc::new(world.clone()), &settings).raster;
-        let green = &picture.picture().rgb().expect("colour")[1];
+        let picture = rendered(&Arc::new(world.clone()), &settings);
         let scene = prepared(&world, &settings);
         let mut unlike = 0;
-        for (x, y) in [(5, 7), (16, 12), (17, 13), (31, 10), (20, 20)] {
-            let samples = (0..16).map(|sample| replay(&scene, x, y, sample));
-            let mut mean = 0.0;
-            for sample in samples {
-                mean += f64::from(sample.radiance.g) / 16.0;
+        for place in [(5, 7), (16, 12), (17, 13), (31, 10), (20, 20)] {
+            for sample in assert_replayed(&scene, &picture, place, 16) {
                 let [a, b] = &sample.branches[..] else { panic!("{} branches", sample.branches.len()) };
                 assert_eq!(a.first(), b.first());
                 unlike += u32::from(a != b);
             }
-            let pixel = f64::from(green[(y * 32 + x) as usize]);
-            assert!((mean - pixel).abs() < 1e-6 * (1.0 + pixel), "{x}, {y}: {mean} {pixel}");
         }
         assert!(unlike > 0 || path_reuse == Use::Never);
     }
@@ -98,13 +79,6 @@ fn in_the_open_branches_halve_the_noise_for_few_rays() {
     assert!(with.1 > without.1 && with.1 < 1.3 * without.1, "{with:?} {without:?}");
 }
 
-fn why_not(world: &Scene, settings: &RenderSettings) -> Option<String> {
-    let prepared = prepared(world, settings);
-    let told = prepared.skipped().into_iter().find(|line| line.starts_with("branches of samples"));
-    assert_eq!(told.is_none(), prepared.has_splitting());
-    told
-}
-
 /// Whatever the seed, and whatever the number of samples.
 #[test]
 fn samples_branch_where_it_pays() {
@@ -115,14 +89,13 @@ fn samples_branch_where_it_pays() {
     set_sky(&mut glowing, [1, 1], vec![0.2]);
     for seed in 0..8 {
         let settings = RenderSettings { seed, ..small(240, 180, 1 << (seed % 4), 6) };
-        assert_eq!(why_not(&open(0.5), &settings), None, "{seed}");
+        assert_eq!(why_not(SPLITTING, &open(0.5), &settings), None, "{seed}");
         for (world, expected) in [
             (dull(), "finding first surfaces is little of the work"),
             (open(1.4), "finding first surfaces is little of the work"),
             (glowing.clone(), "of the noise is of what is seen"),
         ] {
-            let why = why_not(&world, &settings).unwrap_or_default();
-            assert!(why.contains(expected), "{seed}: {why}, not {expected}");
+            assert_not_used(SPLITTING, &world, &settings, expected);
         }
     }
 }
@@ -137,8 +110,7 @@ fn what_keeps_samples_from_branching_is_told() {
     ];
     let world = scene(vec![(ball(0.5, Vec3::Y), lambert(0.6)), lamp()], camera());
     for (settings, expected) in cases {
-        let why = why_not(&world, &settings).expect("a reason");
-        assert!(why.contains(expected), "{why}: {expected}");
+        assert_not_used(SPLITTING, &world, &settings, expected);
     }
-    assert_eq!(why_not(&world, &usual), None);
+    assert_eq!(why_not(SPLITTING, &world, &usual), None);
 }

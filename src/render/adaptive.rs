@@ -110,7 +110,8 @@ impl Grid {
 /// as all together take no more rays than with equal numbers.
 fn shared_out(settings: &RenderSettings, expected: &[Seen]) -> Vec<u32> {
     let mean_noise = expected.iter().map(|seen| seen.noise).sum::<f64>() / expected.len().max(1) as f64;
-    if mean_noise <= 0.0 {
+    // None, or more than numbers can tell: then nothing is known.
+    if !(mean_noise > 0.0 && mean_noise.is_finite()) {
         return vec![settings.spp; expected.len()];
     }
     let choices: Vec<u32> = [first_samples(settings)].into_iter().chain(later_samples(settings)).collect();
@@ -209,6 +210,16 @@ mod tests {
         assert!(plan[..16].iter().all(|&n| n == 128), "{plan:?}");
         let of = |number: u32| plan[16..].iter().filter(|&&n| n == number).count();
         assert_eq!((of(32), of(64)), (32, 16), "{plan:?}");
+    }
+
+    #[test]
+    fn noise_that_overflows_is_no_guide() {
+        for noise in [f64::INFINITY, f64::NAN, 0.0] {
+            let mut expected = [Seen { noise: 0.3, rays: 5.0 }; 24];
+            expected[7].noise = noise;
+            let plan = shared_out(&settings(64), &expected);
+            assert_eq!(plan.iter().all(|&n| n == 64), !noise.is_finite(), "{noise}: {plan:?}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 pub(crate) mod closed;
 pub(crate) mod lit;
+pub(crate) mod technique;
 
 use std::sync::Arc;
 
