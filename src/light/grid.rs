@@ -82,3 +82,36 @@ fn chosen(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
     let (probability, rest) = between(cumulative[index], cumulative[index + 1], u);
     (index, probability, rest)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows that are counted and rows that are searched; one without weight is never chosen.
+    #[test]
+    fn cells_come_as_often_as_they_weigh() {
+        for columns in [3, FEW, FEW + 1, 300] {
+            let weight = |i: usize| if i / columns == 1 { 0.0 } else { (i * i % 7) as f64 };
+            let weights: Vec<f64> = (0..4 * columns).map(weight).collect();
+            let (grid, total) = (Grid::new(&weights, columns), weights.iter().sum::<f64>());
+            for (i, weight) in weights.iter().enumerate() {
+                let probability = f64::from(grid.probability(i % columns, i / columns));
+                assert!((probability - weight / total).abs() < 1e-6, "{columns}, {i}: {probability}");
+            }
+            for (row, in_row) in (0..4).filter_map(|row| Some((row, grid.in_row(row)?))) {
+                for i in (0..997).filter(|_| row != 1) {
+                    let u = i as f32 / 997.0;
+                    let expected = in_row.iter().position(|&c| c > u).expect("the end") - 1;
+                    assert_eq!(chosen(in_row, u).0, expected, "{columns}, {row}: {u}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_weight_there_is_nothing_to_choose() {
+        let grid = Grid::new(&[0.0; 6], 3);
+        assert!(grid.sample([0.5; 2], [0.5; 2]).is_none());
+        assert!(grid.probability(1, 1) <= 0.0);
+    }
+}
