@@ -67,6 +67,7 @@ fn receivers() -> Vec<Receiver> {
             point: anywhere(call, 20),
             normal: anywhere(call, 23).normalize(),
             sides: Sides::Front,
+            gloss: None,
         })
         .collect()
 }

@@ -2,13 +2,15 @@
 
 mod common;
 
-use common::{emitting, lambert, render_scene, scene, set_sky, small, sphere, square};
+use std::sync::Arc;
+
+use common::{emitting, lambert, metal, render_scene, scene, set_sky, small, sphere, square};
 use glam::Vec3;
 use pipeline::math::hash::{combine, unit_f32};
-use pipeline::render::Rendered;
+use pipeline::render::{Control, Geometry, Prepared, Rendered, Techniques, render};
 use pipeline::scene::material::{Param, Sides};
 use pipeline::scene::{Camera, Material, Mesh, Scene};
-use pipeline::settings::RenderSettings;
+use pipeline::settings::{RenderSettings, Use};
 
 fn random(i: u32, salt: u64) -> f32 {
     unit_f32(combine(u64::from(i), salt) as u32)
@@ -67,6 +69,13 @@ fn many_lights() -> Scene {
     world
 }
 
+/// The same above rough metal, which mirrors them.
+fn mirrored_lights() -> Scene {
+    let mut world = many_lights();
+    world.materials[0].item = metal(0.4);
+    world
+}
+
 /// A sky that is brighter above, with a sun of four pixels.
 fn sunny() -> Scene {
     let (width, height) = (64u32, 32u32);
@@ -109,10 +118,41 @@ fn assert_same(what: &str, (a, variance_a): (f64, f64), (b, variance_b): (f64, f
 
 #[test]
 fn short_renders_have_the_mean_of_long_ones() {
-    for (what, world) in [("many lights", many_lights()), ("sunny", sunny())] {
+    for (what, world) in
+        [("many lights", many_lights()), ("mirrored lights", mirrored_lights()), ("sunny", sunny())]
+    {
         let long = pooled(&world, &small(32, 24, 1024, 3), 1);
         let short = pooled(&world, &small(32, 24, 16, 3), 16);
         assert_same(what, short, long);
+    }
+}
+
+/// At the first surface the choice of a light knows what is mirrored to the camera; paths from the lights, and those of neighbours, have to
+/// weigh it alike.
+#[test]
+fn lights_chosen_by_what_is_mirrored_are_the_same_with_less_noise() {
+    let world = mirrored_lights();
+    let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
+    let rendered = |settings: &RenderSettings, lights_by_gloss| {
+        let prepared =
+            Prepared::new(Arc::new(world.clone()), Arc::clone(&geometry), settings).expect("prepared");
+        let prepared = prepared.with(Techniques { lights_by_gloss, ..Techniques::default() });
+        mean_and_variance(&render(&prepared, &Control::default()).expect("a picture"))
+    };
+    let settings = RenderSettings {
+        light_paths: Use::Never,
+        path_reuse: Use::Never,
+        adaptive: Use::Never,
+        ..small(48, 36, 256, 3)
+    };
+    let [by_gloss, by_arrival] = [true, false].map(|by_gloss| rendered(&settings, by_gloss));
+    assert_same("by arrival", by_arrival, by_gloss);
+    assert!(by_gloss.1 < 0.7 * by_arrival.1, "{by_gloss:?} {by_arrival:?}");
+    for (light_paths, path_reuse) in
+        [(Use::Always, Use::Never), (Use::Never, Use::Always), (Use::Always, Use::Always)]
+    {
+        let settings = RenderSettings { light_paths, path_reuse, ..settings.clone() };
+        assert_same(&format!("{light_paths:?} {path_reuse:?}"), rendered(&settings, true), by_arrival);
     }
 }
 
@@ -120,7 +160,9 @@ fn short_renders_have_the_mean_of_long_ones() {
 /// by the tree: neither changes the mean.
 #[test]
 fn all_ways_of_finding_light_find_the_same() {
-    for (what, world) in [("many lights", many_lights()), ("sunny", sunny())] {
+    for (what, world) in
+        [("many lights", many_lights()), ("mirrored lights", mirrored_lights()), ("sunny", sunny())]
+    {
         let both = small(32, 24, 256, 2);
         let all = pooled(&world, &both, 2);
         let lights_alone = RenderSettings { mis: false, ..both.clone() };

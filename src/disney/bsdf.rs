@@ -145,6 +145,16 @@ impl<F: Real> Bsdf<F> {
         self
     }
 
+    /// The square of the alpha of the highlight towards `wo`, and its part of what is reflected there, about; none where there is none
+    /// or where light passes.
+    #[inline]
+    pub fn highlight(&self, wo: V3<F>) -> Option<(F, F)> {
+        match &self.kind {
+            Kind::Disney(mixture) => mixture.highlight(wo),
+            Kind::Lambert { .. } | Kind::Mirror | Kind::Dielectric(_) => None,
+        }
+    }
+
     /// The BSDF without the cosine and without its delta lobes.
     #[inline]
     pub fn eval(&self, wo: V3<F>, wi: V3<F>) -> Rgb<F> {

@@ -134,6 +134,17 @@ impl<F: Real> Mixture<F> {
         Probabilities { cosine, uniform, clearcoat, specular, transmission, diffuse_transmission }
     }
 
+    /// [`super::Bsdf::highlight`].
+    #[inline]
+    pub(super) fn highlight(&self, wo: V3<F>) -> Option<(F, F)> {
+        if self.transmission.is_some() || self.specular.is_delta || wo.z < F::ZERO {
+            return None;
+        }
+        let estimates = self.estimates(wo);
+        let part = estimates.specular / estimates.sum();
+        (part > F::ZERO).then(|| (self.specular.alpha.x * self.specular.alpha.y, part))
+    }
+
     /// From inside there is nothing but the dielectric and diffuse transmission.
     fn estimates_inside(&self, wo: V3<F>) -> Probabilities<F> {
         let mut estimate = Probabilities::default();

@@ -139,6 +139,22 @@ impl Clusters {
     /// About how much of each set's light the receiver gets, in W/m² up to a factor; 0 where none can arrive.
     #[inline]
     pub(super) fn importance(&self, receiver: &Receiver) -> [f32; WIDTH] {
+        match &receiver.gloss {
+            None => self.importance_by(receiver, |cosines, _, _| cosines),
+            Some(gloss) => self.importance_by(receiver, |cosines, wi, sin_squared| {
+                gloss.instead_of(cosines, wi, sin_squared)
+            }),
+        }
+    }
+
+    /// The same, with what the receiver reflects of light that comes with such a sum of cosines, the largest one and that of the middle, from
+    /// the unit direction of the middle, and with the squared sine of half the angle under which the set is seen.
+    #[inline(always)]
+    fn importance_by(
+        &self,
+        receiver: &Receiver,
+        reflected: impl Fn(f32, [f32; 3], f32) -> f32,
+    ) -> [f32; WIDTH] {
         let (p, n) = (receiver.point, receiver.normal);
         let behind = if receiver.sides == Sides::Both { -1.0 } else { 1.0 };
         let mut importances = [0.0; WIDTH];
@@ -164,9 +180,9 @@ impl Clusters {
 
             let is_inside = distance_squared <= radius_squared;
             let arrives = is_inside | (emitted > self.cos_emission[i]) & (received > 0.0);
-            let cosines =
-                (emitted + in_middle.max(0.0)).max(LEAST_FALLOFF) * (received + to_middle.1.max(0.0));
-            let cosines = if is_inside { 4.0 } else { cosines };
+            let leaving = (emitted + in_middle.max(0.0)).max(LEAST_FALLOFF);
+            let reflected = reflected(received + to_middle.1.max(0.0), [x, y, z], sin_squared);
+            let cosines = if is_inside { 4.0 } else { leaving * reflected };
             let arriving = self.intensity[i] * cosines / (distance_squared + 0.25 * radius_squared);
             // Neither nothing nor too much by the range of floats alone.
             let arriving = arriving.clamp(f32::MIN_POSITIVE, LARGEST);

@@ -1,7 +1,7 @@
 //! Which light to sample, and where on it; and how likely that was.
 //!
-//! The choice depends on the lights and on the place and side from which they are seen, never on what a material reflects: jobs of
-//! a sweep share it. Every sampler stands beside its pdf.
+//! The choice depends on the lights, on the place and side from which they are seen, and where the receiver says so on how it mirrors.
+//! Every sampler stands beside its pdf.
 
 mod bounds;
 mod distribution;
@@ -9,6 +9,7 @@ mod emission;
 mod environment;
 mod environment_table;
 mod facing;
+mod gloss;
 mod grid;
 mod patch;
 mod punctual;
@@ -30,6 +31,7 @@ pub use distribution::Distribution;
 pub use emission::Emission;
 pub use environment::{EnvironmentLight, SkyPlace};
 pub use environment_table::{EnvironmentTable, EnvironmentTables, Partner};
+pub use gloss::Gloss;
 
 /// An emitting triangle in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +57,8 @@ pub struct Receiver {
     pub normal: Vec3,
     /// The sides whose light it scatters to there: both, where light comes through.
     pub sides: Sides,
+    /// How it mirrors, where that is to count in the choice of a light.
+    pub gloss: Option<Gloss>,
 }
 
 /// All lights of a scene.
@@ -181,6 +185,12 @@ impl Lights {
     /// There is nothing to sample.
     pub fn is_empty(&self) -> bool {
         self.selection.is_empty()
+    }
+
+    /// There are several lights with a place, so that one is chosen for each receiver.
+    #[inline]
+    pub fn has_choice(&self) -> bool {
+        self.near.len() > 1
     }
 
     /// Emitting triangles, punctual lights and the environment, in that order.
@@ -377,7 +387,7 @@ mod tests {
     }
 
     fn floor(point: Vec3) -> Receiver {
-        Receiver { point, normal: Vec3::Y, sides: Sides::Front }
+        Receiver { point, normal: Vec3::Y, sides: Sides::Front, gloss: None }
     }
 
     pub(super) fn numbers(i: u32) -> [f32; 4] {

@@ -22,7 +22,7 @@ use super::surface::{Shading, Surface};
 use crate::accel::Ray;
 use crate::color::Rgb;
 use crate::disney::{BsdfSample, Lobe};
-use crate::light::{Emission, SkyPlace};
+use crate::light::{Emission, Receiver, SkyPlace};
 use crate::math::sobol::{Purpose, Sampler};
 use crate::math::{Frame, warp};
 
@@ -162,7 +162,8 @@ fn start(scene: &Prepared, sampler: &Sampler) -> Option<Flight> {
 }
 
 /// How a surface that a light path meets scatters its light to a viewer.
-struct Turned {
+struct Turned<'s> {
+    view: Shading<'s>,
     /// The BSDF times |cos θi|.
     f: Rgb,
     /// The density with which a camera's path would be scattered to where the light comes from.
@@ -171,13 +172,13 @@ struct Turned {
     cosines: f32,
 }
 
-impl Turned {
+impl<'s> Turned<'s> {
     #[inline]
-    fn new(scene: &Prepared, surface: &Surface<'_>, shading: &Shading<'_>, wo: Vec3) -> Option<Self> {
+    fn new(scene: &Prepared, surface: &Surface<'_>, shading: &Shading<'s>, wo: Vec3) -> Option<Self> {
         let view = surface.shading_from(scene, shading, wo)?;
         let (f, pdf) = surface.seen_from(wo).reflected(&view, surface.wo);
         let (c_camera, c_light) = (surface.geometric_cosine(wo), surface.geometric_cosine(surface.wo));
-        Some(Self { f, pdf, cosines: c_camera / c_light })
+        Some(Self { view, f, pdf, cosines: c_camera / c_light })
     }
 }
 
@@ -193,12 +194,14 @@ impl Flight {
         rays: &mut u64,
     ) -> Option<Seen> {
         let wo = -sight.direction;
-        let Turned { f, pdf, cosines } =
+        let Turned { view, f, pdf, cosines } =
             Turned::new(scene, surface, shading, wo).filter(|t| !t.f.is_black())?;
         let density =
             cosines * scene.camera.pixels_per_steradian(sight.direction) / (sight.distance * sight.distance);
+        let receiver = || surface.seen_from(wo).receiver_for(scene, &view);
         let per_sample = scene.light_paths.as_ref().ok()?.per_sample as f32;
-        let others = self.others_with(scene, surface, wo, pdf) * density * scene.camera_weight() / per_sample;
+        let others =
+            self.others_with(scene, surface, pdf, receiver) * density * scene.camera_weight() / per_sample;
         let radiance = self.beta * f * (density * power(others));
         // What the camera finds beyond all bounds more densely is left to it: its weight here is nothing, of what may be no number.
         if radiance.is_black() || !others.is_finite() {
@@ -215,8 +218,13 @@ impl Flight {
     /// [`Self::others`] with the density `pdf` of the camera's path from here to where the light came from; at the first surface also with that
     /// of choosing the light.
     #[inline]
-    fn others_with(&self, scene: &Prepared, surface: &Surface<'_>, wo: Vec3, pdf: f32) -> f32 {
-        let receiver = || surface.seen_from(wo).receiver();
+    fn others_with(
+        &self,
+        scene: &Prepared,
+        surface: &Surface<'_>,
+        pdf: f32,
+        receiver: impl FnOnce() -> Receiver,
+    ) -> f32 {
         let pdf_light = match self.light {
             None => 0.0,
             Some(Start::Far(sky)) => scene.lights.pdf_environment(&receiver(), sky),
@@ -254,8 +262,8 @@ impl Flight {
             let scale = sample.eta * sample.eta * cosines * (shading.wo.z / sample.wi.z).abs();
             (weight * scale, self.others)
         } else {
-            let Turned { f, pdf, cosines } = Turned::new(scene, surface, shading, wo)?;
-            let others = self.others_with(scene, surface, wo, pdf);
+            let Turned { f, pdf, cosines, .. } = Turned::new(scene, surface, shading, wo)?;
+            let others = self.others_with(scene, surface, pdf, || surface.seen_from(wo).receiver());
             (f * (cosines / sample.pdf), others * cosines / sample.pdf)
         };
         Some(Self {

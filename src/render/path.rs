@@ -307,15 +307,17 @@ impl Walk {
         }
         // Sample a light, unless no light could be reflected from it.
         let may_reflect = !(shading.bsdf.is_delta() && scene.techniques.useful_light);
+        let receiver = self.receiver(scene, &surface, &shading);
         if may_reflect && !scene.lights.is_empty() {
             let u = sampler.set(self.vertices, Purpose::Light);
-            if let Some(sample) = scene.lights.sample(&surface.receiver(), u) {
+            if let Some(sample) = scene.lights.sample(&receiver, u) {
                 let (way, rays) = (self.from_light, &mut self.path.rays);
                 let direct = direct_light(scene, &surface, &shading, &sample, way, self.medium, rays);
                 self.add(self.beta * direct.radiance, direct.pdf, direct.share);
             }
         }
-        let flow = self.send_on(scene, &surface, &shading, sampler.set(self.vertices, Purpose::Bsdf));
+        let u = sampler.set(self.vertices, Purpose::Bsdf);
+        let flow = self.send_on(scene, &surface, &shading, receiver, u);
         if self.vertices == 1
             && self.trail.is_kept
             && let Some(last) = self.last_scatter
@@ -335,14 +337,16 @@ impl Walk {
         surface: &Surface<'_>,
         shading: &Shading<'_>,
     ) -> ControlFlow<()> {
+        let receiver = surface.receiver();
         if !scene.lights.is_empty() {
             let u = sampler.set(self.vertices, Purpose::Light);
-            let sample = scene.lights.sample(&surface.receiver(), u);
+            let sample = scene.lights.sample(&receiver, u);
             self.trail.direct =
                 sample.and_then(|s| Direct::new(scene, surface, shading, &s, &mut self.path.rays));
         }
         let beta = std::mem::replace(&mut self.beta, Rgb::WHITE);
-        let flow = self.send_on(scene, surface, shading, sampler.set(self.vertices, Purpose::Bsdf));
+        let u = sampler.set(self.vertices, Purpose::Bsdf);
+        let flow = self.send_on(scene, surface, shading, receiver, u);
         let weight = self.beta;
         self.beta = beta * weight;
         if flow.is_continue()
@@ -373,6 +377,13 @@ impl Walk {
         }
     }
 
+    /// A surface that is to scatter the path, as the choice of a light knows it: of the first one also what it mirrors. Later ones that others
+    /// may join look different to each of them.
+    #[inline(always)]
+    fn receiver(&self, scene: &Prepared, surface: &Surface<'_>, shading: &Shading<'_>) -> Receiver {
+        if self.scatterings == 0 { surface.receiver_for(scene, shading) } else { surface.receiver() }
+    }
+
     /// Samples the BSDF for the next direction; breaks where the path ends.
     #[inline(always)]
     fn send_on(
@@ -380,6 +391,7 @@ impl Walk {
         scene: &Prepared,
         surface: &Surface<'_>,
         shading: &Shading<'_>,
+        receiver: Receiver,
         [u_lobe, u0, u1, u_roulette]: [f32; 4],
     ) -> ControlFlow<()> {
         let sample = shading.bsdf.sample(shading.wo, u_lobe, [u0, u1]);
@@ -404,8 +416,7 @@ impl Walk {
         }
         self.eta_scale *= sample.eta * sample.eta;
         self.scatterings += 1;
-        self.last_scatter =
-            (!sample.lobe.is_delta()).then(|| LastScatter { receiver: surface.receiver(), pdf: sample.pdf });
+        self.last_scatter = (!sample.lobe.is_delta()).then_some(LastScatter { receiver, pdf: sample.pdf });
         match self.last_scatter {
             None => self.from_light.mirror(scene, surface, shading, wi),
             Some(_) => {

@@ -30,7 +30,7 @@ impl Prepared {
     /// light; none where that can't shine.
     pub fn shadow_ray(&self, from: &Departure, u: [f32; 4]) -> Option<Ray> {
         let normal = from.viewed_normal();
-        let receiver = Receiver { point: from.point, normal, sides: Sides::Front };
+        let receiver = Receiver { point: from.point, normal, sides: Sides::Front, gloss: None };
         let sample = self.lights.sample(&receiver, u)?;
         Some(match sample.place {
             LightPlace::Surface { triangle, barycentric } => {

@@ -11,7 +11,7 @@ use super::offset::Departure;
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::disney::Bsdf;
-use crate::light::Receiver;
+use crate::light::{Gloss, Receiver};
 use crate::math::{Frame, V3};
 use crate::scene::material::Sides;
 
@@ -173,7 +173,20 @@ impl<'a> Surface<'a> {
     pub(super) fn receiver(&self) -> Receiver {
         let normal = if self.is_front { self.normal } else { -self.normal };
         let sides = if self.material.transmits { Sides::Both } else { Sides::Front };
-        Receiver { point: self.point, normal, sides }
+        Receiver { point: self.point, normal, sides, gloss: None }
+    }
+
+    /// The same for the first surface that scatters a path, where what it mirrors to the viewer of `shading` counts in the choice of a light.
+    #[inline]
+    pub(super) fn receiver_for(&self, scene: &Prepared, shading: &Shading<'_>) -> Receiver {
+        if !(scene.lights.has_choice() && scene.techniques.lights_by_gloss) {
+            return self.receiver();
+        }
+        let gloss = shading.bsdf.highlight(shading.wo).map(|(alpha_squared, part)| {
+            let normal = if shading.wo.z < 0.0 { -shading.frame.normal } else { shading.frame.normal };
+            Gloss::new(self.wo, normal, alpha_squared, part)
+        });
+        Receiver { gloss, ..self.receiver() }
     }
 
     /// Whether `wi` leaves on the viewer's side of the geometric surface.

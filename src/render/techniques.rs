@@ -8,6 +8,8 @@ pub struct Techniques {
     pub sobol: bool,
     /// Lobes are chosen by their albedo; without it each that is there equally often.
     pub lobes_by_albedo: bool,
+    /// Among several lights what a glossy first surface mirrors is chosen more often; without it the light that arrives alone counts.
+    pub lights_by_gloss: bool,
     /// Paths that carry little end early; without it at the greatest depth.
     pub roulette: bool,
     /// Paths start from lights too; without it from the camera alone.
@@ -31,6 +33,7 @@ impl Default for Techniques {
         Self {
             sobol: true,
             lobes_by_albedo: true,
+            lights_by_gloss: true,
             roulette: true,
             light_paths: true,
             path_reuse: true,

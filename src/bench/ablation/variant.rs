@@ -60,6 +60,11 @@ impl Variant {
                 Change::Without(|techniques| techniques.lobes_by_albedo = false),
             ),
             Self::new(
+                "lights by arrival",
+                "a light is chosen by what arrives of it, not by what a glossy surface mirrors",
+                Change::Without(|techniques| techniques.lights_by_gloss = false),
+            ),
+            Self::new(
                 "random numbers",
                 "independent ones instead of Sobol' points, made in the same time",
                 Change::Without(|techniques| techniques.sobol = false),
