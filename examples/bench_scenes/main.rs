@@ -69,6 +69,7 @@ fn run() -> Result<(), MakeError> {
         light(&mut glb);
         write(folder, name, glb)?;
     }
+    write(folder, "street", street())?;
     for (name, trees) in [("grove", 100), ("forest", 1000)] {
         write(folder, name, forest(trees))?;
     }
@@ -200,6 +201,47 @@ fn through_glass(glb: &mut Glb) {
     slab.append(&rectangle(corner, back, right));
     slab.append(&rectangle(corner + up, right, back));
     glb.mesh("pane", &slab, pane);
+}
+
+/// A street at night: lit windows and signs on both sides, 160 of any colour and brightness, a wet road and shiny balls on it.
+fn street() -> Glb {
+    let mut glb = Glb::default();
+    let wet = glb.plain("road", [0.1, 0.1, 0.1], 0.15);
+    let (along, up, across) = (DVec3::Z * 24.0, DVec3::Y * 6.0, DVec3::X * 5.0);
+    let corner = DVec3::new(-2.5, 0.0, -12.0);
+    glb.mesh("road", &rectangle(corner, along, across), wet);
+    let walls = glb.plain("walls", [0.4, 0.35, 0.3], 0.8);
+    glb.mesh("left", &rectangle(corner, up, along), walls);
+    glb.mesh("right", &rectangle(corner + across, along, up), walls);
+    for i in 0..160 {
+        let color = [0, 1, 2].map(|d| 0.2 + 0.8 * random(i, d));
+        let brightness = 2.0 + 40.0 * random(i, 3) * random(i, 3) * random(i, 4) * random(i, 4);
+        let light = glb.emissive(&format!("light_{i}"), color, brightness);
+        let (width, height) = (0.08 + 0.3 * random(i, 5), 0.08 + 0.3 * random(i, 6));
+        let (right, top) = (DVec3::Z * width, DVec3::Y * height);
+        let y = 0.5 + 5.0 * random(i, 7);
+        let z = -11.5 + 22.0 * random(i, 8);
+        let sign = if i % 2 == 0 {
+            rectangle(DVec3::new(-2.49, y, z), top, right)
+        } else {
+            rectangle(DVec3::new(2.49, y, z), right, top)
+        };
+        glb.mesh(&format!("light_{i}"), &sign, light);
+    }
+    for i in 0..8 {
+        let metallic = f64::from(u8::from(i % 2 == 1));
+        let [r, g, b] = [0, 1, 2].map(|d| 0.8 * random(i, 20 + d));
+        let material = glb.material(json!({
+            "name": format!("ball_{i}"),
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [r, g, b, 1.0], "metallicFactor": metallic, "roughnessFactor": 0.1 + 0.4 * random(i, 23),
+            },
+        }));
+        let center = DVec3::new(4.0 * random(i, 24) - 2.0, 0.4, 16.0 * random(i, 25) - 8.0);
+        glb.mesh(&format!("ball_{i}"), &geodesic_sphere(center, 0.4, 12), material);
+    }
+    glb.camera(DVec3::new(0.0, 1.7, 11.0), DVec3::new(0.0, 1.2, 0.0), 50.0, 4.0 / 3.0);
+    glb
 }
 
 /// A meadow of `count` trees, one mesh of 100,000 triangles, turned about their trunks and of any size from a half to one and a half.
