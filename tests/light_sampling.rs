@@ -70,9 +70,9 @@ fn many_lights() -> Scene {
 }
 
 /// The same above rough metal, which mirrors them.
-fn mirrored_lights() -> Scene {
+fn mirrored_lights(roughness: f32) -> Scene {
     let mut world = many_lights();
-    world.materials[0].item = metal(0.4);
+    world.materials[0].item = metal(roughness);
     world
 }
 
@@ -119,7 +119,7 @@ fn assert_same(what: &str, (a, variance_a): (f64, f64), (b, variance_b): (f64, f
 #[test]
 fn short_renders_have_the_mean_of_long_ones() {
     for (what, world) in
-        [("many lights", many_lights()), ("mirrored lights", mirrored_lights()), ("sunny", sunny())]
+        [("many lights", many_lights()), ("mirrored lights", mirrored_lights(0.4)), ("sunny", sunny())]
     {
         let long = pooled(&world, &small(32, 24, 1024, 3), 1);
         let short = pooled(&world, &small(32, 24, 16, 3), 16);
@@ -131,7 +131,7 @@ fn short_renders_have_the_mean_of_long_ones() {
 /// weigh it alike.
 #[test]
 fn lights_chosen_by_what_is_mirrored_are_the_same_with_less_noise() {
-    let world = mirrored_lights();
+    let world = mirrored_lights(0.4);
     let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
     let rendered = |settings: &RenderSettings, lights_by_gloss| {
         let prepared =
@@ -160,8 +160,7 @@ fn lights_chosen_by_what_is_mirrored_are_the_same_with_less_noise() {
 /// their weights, 0.13% would be missing.
 #[test]
 fn light_paths_weigh_lights_that_are_mirrored_as_the_camera_does() {
-    let mut world = many_lights();
-    world.materials[0].item = metal(0.3);
+    let world = mirrored_lights(0.3);
     let settings = RenderSettings {
         light_paths: Use::Never,
         path_reuse: Use::Never,
@@ -190,7 +189,7 @@ fn light_paths_weigh_lights_that_are_mirrored_as_the_camera_does() {
 #[test]
 fn all_ways_of_finding_light_find_the_same() {
     for (what, world) in
-        [("many lights", many_lights()), ("mirrored lights", mirrored_lights()), ("sunny", sunny())]
+        [("many lights", many_lights()), ("mirrored lights", mirrored_lights(0.4)), ("sunny", sunny())]
     {
         let both = small(32, 24, 256, 2);
         let all = pooled(&world, &both, 2);

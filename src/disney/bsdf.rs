@@ -145,8 +145,8 @@ impl<F: Real> Bsdf<F> {
         self
     }
 
-    /// The square of the alpha of the highlight towards `wo`, and its part of what is reflected there, about; none where there is none
-    /// or where light passes.
+    /// The square of the alpha of the highlight towards `wo`, and its part of what is reflected there, about; none where there is none,
+    /// from behind, or where light passes.
     #[inline]
     pub fn highlight(&self, wo: V3<F>) -> Option<(F, F)> {
         match &self.kind {

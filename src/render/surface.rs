@@ -182,10 +182,9 @@ impl<'a> Surface<'a> {
         if !(scene.lights.has_choice() && scene.techniques.lights_by_gloss) {
             return self.receiver();
         }
-        let gloss = shading.bsdf.highlight(shading.wo).map(|(alpha_squared, part)| {
-            let normal = if shading.wo.z < 0.0 { -shading.frame.normal } else { shading.frame.normal };
-            Gloss::new(self.wo, normal, alpha_squared, part)
-        });
+        let highlight = shading.bsdf.highlight(shading.wo);
+        let gloss = highlight
+            .map(|(alpha_squared, part)| Gloss::new(self.wo, shading.frame.normal, alpha_squared, part));
         Receiver { gloss, ..self.receiver() }
     }
 
