@@ -17,7 +17,6 @@ import time
 import beside
 import numpy
 
-
 # Samples that are rendered at once: llvm_ad_rgb keeps the state of all of them.
 MOST_AT_ONCE = 1 << 24
 
@@ -44,7 +43,7 @@ def load(mitsuba, options, scene, folder, size):
         passes = -(-samples * size[0] * size[1] // MOST_AT_ONCE)
         start = time.perf_counter()
         pictures = [
-            numpy.array(mitsuba.render(loaded, spp=samples // passes, seed=seed + part), dtype=numpy.float64)
+            numpy.array(mitsuba.render(loaded, spp=-(-samples // passes), seed=seed * passes + part), dtype=numpy.float64)
             for part in range(passes)
         ]
         return numpy.mean(pictures, axis=0), time.perf_counter() - start
@@ -57,8 +56,9 @@ def main():
     parser.add_argument("--variant", default="scalar_rgb")
     parser.add_argument("--sampler", default="multijitter")
     options = parser.parse_args()
-    # Asks for LLVM as it is imported.
-    find_llvm()
+    if options.variant.startswith("llvm"):
+        find_llvm()
+    # Looks for LLVM as it is imported.
     import drjit
     import mitsuba
 
