@@ -2,10 +2,11 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub};
 
+use glam::{BVec4A, Vec4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::math::Real;
+use crate::math::{Number, Real};
 
 /// A linear colour with Rec. 709 primaries: a reflectance in [0, 1], or a radiance in any unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -24,7 +25,7 @@ pub struct Rgb<F = f32> {
     pub b: F,
 }
 
-impl<F: Real> Rgb<F> {
+impl<F: Number> Rgb<F> {
     /// No light.
     pub const BLACK: Self = Self { r: F::ZERO, g: F::ZERO, b: F::ZERO };
     /// Reflectance 1 or radiance 1.
@@ -72,6 +73,14 @@ impl<F: Real> Rgb<F> {
         self.r.max(self.g).max(self.b)
     }
 
+    /// self·(1 - t) + other·t.
+    #[inline]
+    pub fn lerp(self, other: Self, t: F) -> Self {
+        self * (F::ONE - t) + other * t
+    }
+}
+
+impl<F: Real> Rgb<F> {
     /// Every channel is 0.
     #[inline]
     pub fn is_black(self) -> bool {
@@ -84,16 +93,38 @@ impl<F: Real> Rgb<F> {
         self.r.is_finite() && self.g.is_finite() && self.b.is_finite()
     }
 
-    /// self·(1 - t) + other·t.
-    #[inline]
-    pub fn lerp(self, other: Self, t: F) -> Self {
-        self * (F::ONE - t) + other * t
-    }
-
     /// The same colour in another float type.
     #[inline]
     pub fn cast<G: Real>(self) -> Rgb<G> {
         Rgb::new(G::of(self.r.to_f64()), G::of(self.g.to_f64()), G::of(self.b.to_f64()))
+    }
+}
+
+impl Rgb<Vec4> {
+    /// Four colours side by side.
+    #[inline(always)]
+    pub fn beside(four: [Rgb; 4]) -> Self {
+        let channel = |of: fn(&Rgb) -> f32| Vec4::from_array(four.each_ref().map(of));
+        Self::new(channel(|c| c.r), channel(|c| c.g), channel(|c| c.b))
+    }
+
+    /// The same colour in all lanes.
+    #[inline(always)]
+    pub fn splat(color: Rgb) -> Self {
+        Self::new(Vec4::splat(color.r), Vec4::splat(color.g), Vec4::splat(color.b))
+    }
+
+    /// The colour in a lane.
+    #[inline(always)]
+    pub fn lane(self, lane: usize) -> Rgb {
+        Rgb::new(self.r[lane], self.g[lane], self.b[lane])
+    }
+
+    /// `yes` where the mask says so, and `no` elsewhere.
+    #[inline(always)]
+    pub fn select(mask: BVec4A, yes: Self, no: Self) -> Self {
+        let choose = |yes: Vec4, no: Vec4| Vec4::select(mask, yes, no);
+        Self::new(choose(yes.r, no.r), choose(yes.g, no.g), choose(yes.b, no.b))
     }
 }
 
@@ -119,7 +150,7 @@ impl<F> From<Rgb<F>> for [F; 3] {
     }
 }
 
-impl<F: Real> Add for Rgb<F> {
+impl<F: Number> Add for Rgb<F> {
     type Output = Self;
     #[inline]
     fn add(self, o: Self) -> Self {
@@ -127,7 +158,7 @@ impl<F: Real> Add for Rgb<F> {
     }
 }
 
-impl<F: Real> Sub for Rgb<F> {
+impl<F: Number> Sub for Rgb<F> {
     type Output = Self;
     #[inline]
     fn sub(self, o: Self) -> Self {
@@ -135,7 +166,7 @@ impl<F: Real> Sub for Rgb<F> {
     }
 }
 
-impl<F: Real> Mul for Rgb<F> {
+impl<F: Number> Mul for Rgb<F> {
     type Output = Self;
     #[inline]
     fn mul(self, o: Self) -> Self {
@@ -143,7 +174,7 @@ impl<F: Real> Mul for Rgb<F> {
     }
 }
 
-impl<F: Real> Mul<F> for Rgb<F> {
+impl<F: Number> Mul<F> for Rgb<F> {
     type Output = Self;
     #[inline]
     fn mul(self, s: F) -> Self {
@@ -151,7 +182,7 @@ impl<F: Real> Mul<F> for Rgb<F> {
     }
 }
 
-impl<F: Real> Div<F> for Rgb<F> {
+impl<F: Number> Div<F> for Rgb<F> {
     type Output = Self;
     #[inline]
     fn div(self, s: F) -> Self {
@@ -159,14 +190,14 @@ impl<F: Real> Div<F> for Rgb<F> {
     }
 }
 
-impl<F: Real> AddAssign for Rgb<F> {
+impl<F: Number> AddAssign for Rgb<F> {
     #[inline]
     fn add_assign(&mut self, o: Self) {
         *self = *self + o;
     }
 }
 
-impl<F: Real> MulAssign for Rgb<F> {
+impl<F: Number> MulAssign for Rgb<F> {
     #[inline]
     fn mul_assign(&mut self, o: Self) {
         *self = *self * o;

@@ -7,7 +7,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DQuat, DVec2, DVec3};
-use pipeline::math::Real;
+use pipeline::math::{Number, Real};
 
 use super::field::{Field, round_max, round_rectangle};
 use super::mesh::{Mesh, Vertex};

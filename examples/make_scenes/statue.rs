@@ -4,7 +4,7 @@ use std::io::Write;
 
 use flate2::{Compression, GzBuilder};
 use glam::{DVec2, DVec3};
-use pipeline::math::{Real, hash};
+use pipeline::math::{Number, Real, hash};
 
 use super::field::{blend, carve, ellipsoid, limb, round_box, round_max};
 use super::glb::{Glb, GlbError};

@@ -117,6 +117,13 @@ impl Node {
         // Before the others, as the traversal waits for it.
         let first = self.child[entered.trailing_zeros() as usize % 8];
         let mut others = entered & (entered - 1);
+        if others & others.wrapping_sub(1) == 0 {
+            // One or none: not told apart by a branch, which could not be guessed.
+            let bottom = pending.len();
+            pending.push(self.child[others.trailing_zeros() as usize % 8]);
+            pending.truncate(bottom + usize::from(others != 0));
+            return first;
+        }
         while others != 0 {
             let last = 31 - others.leading_zeros();
             others ^= 1 << last;

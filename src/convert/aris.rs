@@ -2,7 +2,7 @@
 
 use super::{Note, Quality};
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
-use crate::math::Real;
+use crate::math::Number;
 use crate::record::Warning;
 use crate::scene::Material;
 use crate::scene::material::{Param, ShadingFrame, Sides};

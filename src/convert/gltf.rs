@@ -4,7 +4,7 @@ use super::tint::{F0_OF_SPECULAR, disney_luminance, fit_tint};
 use super::{ClearcoatScale, ConvertOptions, Note, Quality};
 use crate::color::Rgb;
 use crate::disney::{DiffuseModel, Masking, Model, Parameter};
-use crate::math::Real;
+use crate::math::Number;
 use crate::record::Warning;
 use crate::scene::material::{
     Curve, Emission, NormalMap, Opacity, Param, ShadingFrame, Sides, TextureChannel, TextureMap,
@@ -226,7 +226,7 @@ fn make_unlit(source: &GltfMaterial, material: &mut Material, notes: &mut Notes)
 /// F0 of a smooth interface to air: ((n-1)/(n+1))²; glTF's ior 0 stands for F = 1 everywhere.
 pub(crate) fn f0_of_ior(ior: f32) -> f64 {
     let ior = f64::from(ior);
-    if ior == 0.0 { 1.0 } else { Real::sqr((ior - 1.0) / (ior + 1.0)) }
+    if ior == 0.0 { 1.0 } else { Number::sqr((ior - 1.0) / (ior + 1.0)) }
 }
 
 /// KHR_materials_ior and KHR_materials_specular: F0 = min(F0(ior)·color, 1)·factor as specular and specular_tint.

@@ -103,11 +103,11 @@ pub(super) fn scattered<F: Real>(sample: BsdfSample<F>) -> Option<BsdfSample<F>>
 /// What doesn't transmit is black from behind, and so is a thin sheet: a two-sided material turns the frame first.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<F = f32> {
-    kind: Kind<F>,
+    pub(super) kind: Kind<F>,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Kind<F> {
+pub(super) enum Kind<F> {
     Disney(Mixture<F>),
     Lambert { base_color: Rgb<F> },
     Mirror,

@@ -1,10 +1,12 @@
 //! The clearcoat: a second, achromatic specular lobe with GTR1's long tail.
 
+use glam::Vec4;
+
 use super::fresnel::schlick_weight;
 use super::microfacet::{Gtr1, smith_isotropic};
 use super::pair::Pair;
 use super::parameter::Params;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// Alpha of the coat's masking term, whatever the gloss.
 const MASKING_ALPHA: f64 = 0.25;
@@ -28,7 +30,25 @@ impl<F: Real> Clearcoat<F> {
         let alpha = F::of(0.1).lerp(F::of(0.001), params.clearcoat_gloss);
         Some(Self { strength: F::of(0.25) * params.clearcoat, distribution: Gtr1::new(alpha) })
     }
+}
 
+impl Clearcoat<f32> {
+    /// The coat that adds nothing.
+    pub(super) fn none(&self) -> Self {
+        Self { strength: 0.0, ..*self }
+    }
+
+    /// Four side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Clearcoat<Vec4> {
+        Clearcoat {
+            strength: Vec4::from_array(four.map(|coat| coat.strength)),
+            distribution: Gtr1::beside(four.map(|coat| &coat.distribution)),
+        }
+    }
+}
+
+impl<F: Number> Clearcoat<F> {
     /// An estimate of the reflected part of light: a fit to the integral, within a third of it at any gloss.
     #[inline]
     pub(super) fn albedo(&self, wo: V3<F>) -> F {
@@ -47,7 +67,9 @@ impl<F: Real> Clearcoat<F> {
         // hz/(4 cos θd) = sum.z/|sum| / (2|sum|).
         (self.strength * masking * fresnel * d, F::of(0.5) * d * pair.sum.z / pair.sum2)
     }
+}
 
+impl<F: Real> Clearcoat<F> {
     /// The largest weight of a sample; see `bound`.
     pub(super) fn weight_bound(&self, mu: F) -> F {
         let alpha = F::of(MASKING_ALPHA);

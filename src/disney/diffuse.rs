@@ -1,11 +1,13 @@
 //! The diffuse lobe: Burley's, Lambert's or glTF's, with the subsurface blend.
 
+use glam::Vec4;
+
 use super::fresnel::{Edge, schlick_weight};
 use super::pair::Pair;
 use super::parameter::{DiffuseModel, Params};
 use super::specular::Schlick;
 use crate::color::Rgb;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// The base colour's diffuse reflection: what metal, interface and diffuse transmission leave of it.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +18,7 @@ pub(super) struct Diffuse<F> {
     left: Schlick<F>,
     pub(super) roughness: F,
     pub(super) subsurface: F,
+    pub(super) has_subsurface: bool,
     pub(super) model: DiffuseModel,
     // Coefficients of `albedos`, for the plain shape and for the subsurface's.
     plain: F,
@@ -52,6 +55,7 @@ impl<F: Real> Diffuse<F> {
             left,
             roughness: params.roughness,
             subsurface: params.subsurface,
+            has_subsurface: params.subsurface > F::ZERO,
             model,
             plain,
             plain_rise: plain * retro,
@@ -59,7 +63,34 @@ impl<F: Real> Diffuse<F> {
             flat_rise: flat * (F::of(0.9) * params.roughness - F::of(0.7)),
         })
     }
+}
 
+impl Diffuse<f32> {
+    /// The lobe of the same shape that reflects nothing.
+    pub(super) fn none(&self) -> Self {
+        Self { color: Rgb::BLACK, plain: 0.0, plain_rise: 0.0, flat: 0.0, flat_rise: 0.0, ..*self }
+    }
+
+    /// Four of one model side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Diffuse<Vec4> {
+        let each = |field: fn(&Self) -> f32| Vec4::from_array(four.map(field));
+        Diffuse {
+            color: Rgb::beside(four.map(|d| d.color)),
+            left: Schlick::beside(four.map(|d| &d.left)),
+            roughness: each(|d| d.roughness),
+            subsurface: each(|d| d.subsurface),
+            has_subsurface: four.iter().any(|d| d.has_subsurface),
+            model: four[0].model,
+            plain: each(|d| d.plain),
+            plain_rise: each(|d| d.plain_rise),
+            flat: each(|d| d.flat),
+            flat_rise: each(|d| d.flat_rise),
+        }
+    }
+}
+
+impl<F: Number> Diffuse<F> {
     /// An estimate of the reflected part of light, a fit to the integral: for the cosine sampler and for the uniform one.
     ///
     /// The subsurface shape holds 1/(cos θi + cos θo), which cosine sampling would turn into unbounded weights at grazing angles; a
@@ -93,13 +124,13 @@ impl<F: Real> Diffuse<F> {
     #[inline]
     pub(super) fn eval(&self, pair: &Pair<F>) -> Rgb<F> {
         let mut shape = F::ONE;
-        if self.model == DiffuseModel::Burley || self.subsurface > F::ZERO {
+        if self.model == DiffuseModel::Burley || self.has_subsurface {
             let fresnel = [Edge::at(pair.wi.z), Edge::at(pair.wo.z)];
             let retro = pair.cos2_d * self.roughness;
             if self.model == DiffuseModel::Burley {
                 shape = both_ways(F::of(0.5) + F::of(2.0) * retro, fresnel);
             }
-            if self.subsurface > F::ZERO {
+            if self.has_subsurface {
                 let flat = both_ways(retro, fresnel) * (F::ONE / (pair.wi.z + pair.wo.z) - F::of(0.5));
                 shape = shape.lerp(F::of(1.25) * (flat + F::of(0.5)), self.subsurface);
             }
@@ -118,6 +149,6 @@ impl<F: Real> Diffuse<F> {
 
 /// lerp(1, f90, FL)·lerp(1, f90, FV).
 #[inline]
-fn both_ways<F: Real>(f90: F, [l, v]: [Edge<F>; 2]) -> F {
+fn both_ways<F: Number>(f90: F, [l, v]: [Edge<F>; 2]) -> F {
     (l.rest + f90 * l.weight) * (v.rest + f90 * v.weight)
 }

@@ -1,10 +1,10 @@
 //! Fresnel reflectance: Schlick's approximation and the exact one of a dielectric.
 
-use crate::math::Real;
+use crate::math::{Number, Real};
 
 /// Schlick's weight (1 - cos θ)⁵: reflectance is lerp(F0, 1, weight). Schlick 1994, eq. 15.
 #[inline]
-pub fn schlick_weight<F: Real>(cos_theta: F) -> F {
+pub fn schlick_weight<F: Number>(cos_theta: F) -> F {
     (F::ONE - cos_theta).clamp(F::ZERO, F::ONE).pow5()
 }
 
@@ -17,7 +17,7 @@ pub(super) struct Edge<F> {
     pub(super) rest: F,
 }
 
-impl<F: Real> Edge<F> {
+impl<F: Number> Edge<F> {
     /// At an angle of this cosine.
     #[inline]
     pub(super) fn at(cos_theta: F) -> Self {
@@ -44,7 +44,7 @@ pub(super) struct DielectricSplit<F> {
     pub(super) cos_t: F,
 }
 
-impl<F: Real> DielectricSplit<F> {
+impl<F: Number> DielectricSplit<F> {
     /// Where there is no interface: nothing reflected by it and nothing passed on.
     pub(super) const OPAQUE: Self = Self { reflectance: F::ZERO, transmittance: F::ZERO, cos_t: F::ZERO };
 }

@@ -3,8 +3,10 @@
 //! Distributions take the half vector as it comes from `wo + wi`, not normalised, and are written in its components: the textbook's
 //! 1 + (a² - 1) cos² θh cancels in `f32`, by 8% at a = 0.001.
 
+use glam::Vec4;
+
 use super::pair::Pair;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// The smallest alpha of the specular lobe, per axis.
 pub const ALPHA_MIN: f64 = 0.001;
@@ -45,7 +47,31 @@ impl<F: Real> Gtr2<F> {
             peak: F::FRAC_1_PI / (alpha.x * alpha.y),
         }
     }
+}
 
+impl Alpha<f32> {
+    /// Four side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Alpha<Vec4> {
+        Alpha { x: Vec4::from_array(four.map(|a| a.x)), y: Vec4::from_array(four.map(|a| a.y)) }
+    }
+}
+
+impl Gtr2<f32> {
+    /// Four side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Gtr2<Vec4> {
+        let each = |field: fn(&Self) -> f32| Vec4::from_array(four.map(field));
+        Gtr2 {
+            alpha: Alpha::beside(four.map(|d| &d.alpha)),
+            inv_ax2: each(|d| d.inv_ax2),
+            inv_ay2: each(|d| d.inv_ay2),
+            peak: each(|d| d.peak),
+        }
+    }
+}
+
+impl<F: Number> Gtr2<F> {
     /// Normals per unit solid angle around the half vector: 1/(π ax ay (hx²/ax² + hy²/ay² + hz²)²).
     #[inline]
     pub(super) fn density(&self, pair: &Pair<F>) -> F {
@@ -58,7 +84,9 @@ impl<F: Real> Gtr2<F> {
         let stretched = h.x.sqr() * self.inv_ax2 + h.y.sqr() * self.inv_ay2 + h.z.sqr();
         self.peak * (h2 / stretched).sqr()
     }
+}
 
+impl<F: Real> Gtr2<F> {
     /// A normal visible from `wo` (wo.z > 0), not normalised, by spherical caps (Dupuy and Benyoub 2023, listing 3). The density is
     /// 2·smith(wo)·(wo·h)·D(h) per unit solid angle of h.
     #[inline]
@@ -78,13 +106,13 @@ impl<F: Real> Gtr2<F> {
 ///
 /// Two of them multiplied hold the 1/(4 cos θi cos θo) of the microfacet formula.
 #[inline]
-pub(super) fn smith<F: Real>(w: V3<F>, alpha: Alpha<F>) -> F {
+pub(super) fn smith<F: Number>(w: V3<F>, alpha: Alpha<F>) -> F {
     F::ONE / (w.z + ((w.x * alpha.x).sqr() + (w.y * alpha.y).sqr() + w.z.sqr()).sqrt())
 }
 
 /// The same, isotropic: 1/(cos θ + sqrt(a² + (1 - a²) cos² θ)).
 #[inline]
-pub(super) fn smith_isotropic<F: Real>(cos_theta: F, alpha: F) -> F {
+pub(super) fn smith_isotropic<F: Number>(cos_theta: F, alpha: F) -> F {
     let a2 = alpha.sqr();
     F::ONE / (cos_theta + (a2 + (F::ONE - a2) * cos_theta.sqr()).sqrt())
 }
@@ -105,14 +133,27 @@ impl<F: Real> Gtr1<F> {
         let ln_a2 = a2.ln();
         Self { a2, ln_a2, scale: (a2 - F::ONE) * F::FRAC_1_PI / ln_a2 }
     }
+}
 
+impl Gtr1<f32> {
+    /// Four side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Gtr1<Vec4> {
+        let each = |field: fn(&Self) -> f32| Vec4::from_array(four.map(field));
+        Gtr1 { a2: each(|d| d.a2), ln_a2: each(|d| d.ln_a2), scale: each(|d| d.scale) }
+    }
+}
+
+impl<F: Number> Gtr1<F> {
     /// Normals per unit solid angle around the half vector: (a² - 1)/(π ln a²)/(hx² + hy² + a² hz²).
     #[inline]
     pub(super) fn density(&self, pair: &Pair<F>) -> F {
         let h = pair.sum;
         self.scale * pair.sum2 / (h.x.sqr() + h.y.sqr() + self.a2 * h.z.sqr())
     }
+}
 
+impl<F: Real> Gtr1<F> {
     /// A normal with density D(h)·hz per unit solid angle (Burley 2012, eq. 5), unit length.
     ///
     /// The report's cos² θ = (1 - a^(2(1-u)))/(1 - a²) loses θ near the pole; the same as sin² θ = a²(a^(-2u) - 1)/(1 - a²) doesn't.

@@ -13,7 +13,7 @@ use super::specular::{Schlick, Specular};
 use super::transmission::{DiffuseTransmission, Passage, Refraction, Transmission};
 use crate::color::Rgb;
 use crate::math::warp::{cosine_hemisphere, uniform_hemisphere, uniform_hemisphere_pdf};
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// A Disney material at one point: its lobes with all that doesn't depend on directions precomputed; absent lobes are `None`.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,44 @@ pub(super) struct Mixture<F> {
     pub(super) thin_walled: bool,
     /// Lobes are sampled equally often, however much they scatter.
     pub(super) equal_lobes: bool,
+}
+
+impl<F: Number> Mixture<F> {
+    /// [`Self::eval_with_pdf`] of a mixture that transmits nothing and mirrors nothing.
+    #[inline(always)]
+    pub(super) fn opaque(&self, wo: V3<F>, wi: V3<F>) -> (Rgb<F>, F) {
+        let (pair, is_there) = Pair::masked(wo, wi);
+        let chance = self.estimates_of_reflection(wo, &DielectricSplit::OPAQUE).normalized();
+        let (shape, pdf) = self.specular.shape_with_pdf(&pair);
+        let specular = self.specular.fresnel(pair.edge, &DielectricSplit::OPAQUE) * shape;
+        let (f, pdf) = self.with_other_reflection((specular, chance.specular * pdf), &chance, &pair);
+        let there = |value: F| F::select(is_there, value, F::ZERO);
+        (f.map(there), there(pdf))
+    }
+
+    /// Adds the lobes that reflect in front to the specular one's.
+    #[inline(always)]
+    fn with_other_reflection(
+        &self,
+        (mut f, mut pdf): (Rgb<F>, F),
+        chance: &Probabilities<F>,
+        pair: &Pair<F>,
+    ) -> (Rgb<F>, F) {
+        if let Some(diffuse) = &self.diffuse {
+            f += diffuse.eval(pair);
+            pdf += chance.uniform * uniform_hemisphere_pdf::<F>();
+        }
+        if let Some(sheen) = &self.sheen {
+            f += sheen.eval(pair);
+        }
+        pdf += chance.cosine * pair.wi.z * F::FRAC_1_PI;
+        if let Some(coat) = &self.clearcoat {
+            let (f_coat, pdf_coat) = coat.eval_with_pdf(pair);
+            f += Rgb::grey(f_coat);
+            pdf += chance.clearcoat * pdf_coat;
+        }
+        (f, pdf)
+    }
 }
 
 impl<F: Real> Mixture<F> {
@@ -68,21 +106,8 @@ impl<F: Real> Mixture<F> {
 
     #[inline]
     fn reflected_in_front(&self, chance: &Probabilities<F>, pair: &Pair<F>) -> (Rgb<F>, F) {
-        let (mut f, mut pdf) = self.specular_in_front(chance.specular, pair);
-        if let Some(diffuse) = &self.diffuse {
-            f += diffuse.eval(pair);
-            pdf += chance.uniform * uniform_hemisphere_pdf::<F>();
-        }
-        if let Some(sheen) = &self.sheen {
-            f += sheen.eval(pair);
-        }
-        pdf += chance.cosine * pair.wi.z * F::FRAC_1_PI;
-        if let Some(coat) = &self.clearcoat {
-            let (f_coat, pdf_coat) = coat.eval_with_pdf(pair);
-            f += Rgb::grey(f_coat);
-            pdf += chance.clearcoat * pdf_coat;
-        }
-        (f, pdf)
+        let specular = self.specular_in_front(chance.specular, pair);
+        self.with_other_reflection(specular, chance, pair)
     }
 
     #[inline]

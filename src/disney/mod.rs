@@ -11,6 +11,7 @@ mod bsdf;
 mod clearcoat;
 mod dielectric;
 mod diffuse;
+mod four;
 mod fresnel;
 mod microfacet;
 mod mixture;
@@ -25,6 +26,7 @@ mod tests;
 mod transmission;
 
 pub use bsdf::{Bsdf, BsdfSample, Lobe};
+pub use four::FourBsdfs;
 pub use fresnel::{fresnel_dielectric, schlick_weight};
 pub use microfacet::{ALPHA_MIN, Alpha, alpha_from_roughness};
 pub use parameter::{

@@ -1,7 +1,7 @@
 //! What the lobes need to know of a pair of directions, computed once.
 
 use super::fresnel::Edge;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// Two directions above the surface with the terms all lobes share.
 ///
@@ -32,30 +32,35 @@ impl<F: Real> Pair<F> {
     pub(super) fn new(wo: V3<F>, wi: V3<F>) -> Option<Self> {
         let sum = wo + wi;
         let sum2 = sum.length_squared();
-        let above = wo.z > F::ZERO && wi.z > F::ZERO;
-        let has_half_vector = sum.z > F::of(1e-15) && sum2.is_finite();
-        if !(above && has_half_vector) {
-            return None;
-        }
+        Self::is_there(wo, wi, sum, sum2).then(|| Self::of(wo, wi, sum, sum2))
+    }
+}
+
+impl<F: Number> Pair<F> {
+    /// The same for every lane, with those where it is there; the others hold no numbers of use.
+    #[inline(always)]
+    pub(super) fn masked(wo: V3<F>, wi: V3<F>) -> (Self, F::Mask) {
+        let sum = wo + wi;
+        let sum2 = sum.length_squared();
+        (Self::of(wo, wi, sum, sum2), Self::is_there(wo, wi, sum, sum2))
+    }
+
+    #[inline(always)]
+    fn is_there(wo: V3<F>, wi: V3<F>, sum: V3<F>, sum2: F) -> F::Mask {
+        let are_above = wo.z.above(F::ZERO) & wi.z.above(F::ZERO);
+        are_above & sum.z.above(F::of(1e-15)) & F::of(f64::INFINITY).above(sum2)
+    }
+
+    #[inline(always)]
+    fn of(wo: V3<F>, wi: V3<F>, sum: V3<F>, sum2: F) -> Self {
         // The mean of the two directions' cosines with the half vector. They differ where rounding left the lengths unequal, and one of
         // them is negative then if the directions are nearly opposite.
         let cos_d = F::of(0.5) * sum2.sqrt();
         // Schlick's weight is that of the light's own cosine, as in disney.brdf: dot(L, H).
         let cos_i = (wi.dot(sum) / sum2.sqrt()).max(F::ZERO);
-        let one_minus_cos_i = if cos_i > F::of(0.5) {
-            // = sin² θd/(1 + cos θd) with sin θd = |wo - wi|/2: no cancellation near θd = 0.
-            F::of(0.25) * (wo - wi).length_squared() / (F::ONE + cos_i)
-        } else {
-            F::ONE - cos_i
-        };
-        Some(Self {
-            wo,
-            wi,
-            sum,
-            sum2,
-            cos_d,
-            cos2_d: cos_d.sqr(),
-            edge: Edge::given_both(cos_i, one_minus_cos_i),
-        })
+        // = sin² θd/(1 + cos θd) with sin θd = |wo - wi|/2: no cancellation near θd = 0.
+        let near_0 = F::of(0.25) * (wo - wi).length_squared() / (F::ONE + cos_i);
+        let one_minus_cos_i = F::select(cos_i.above(F::of(0.5)), near_0, F::ONE - cos_i);
+        Self { wo, wi, sum, sum2, cos_d, cos2_d: cos_d.sqr(), edge: Edge::given_both(cos_i, one_minus_cos_i) }
     }
 }

@@ -3,7 +3,7 @@
 use super::fresnel::{DielectricSplit, dielectric_split};
 use super::mixture::Mixture;
 use super::transmission::Passage;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// How often each sampler is chosen: they sum to 1, or are all 0 where nothing is scattered; before that, the estimates they are
 /// proportional to.
@@ -32,7 +32,7 @@ pub(super) enum Choice {
     Specular,
 }
 
-impl<F: Real> Probabilities<F> {
+impl<F: Number> Probabilities<F> {
     /// The sum of all.
     #[inline]
     pub(super) fn sum(&self) -> F {
@@ -41,14 +41,11 @@ impl<F: Real> Probabilities<F> {
     }
 
     #[inline]
-    fn normalized(self) -> Self {
+    pub(super) fn normalized(self) -> Self {
         let sum = self.sum();
-        if sum <= F::ZERO {
-            return Self::default();
-        }
         // The reciprocal of a denormal sum isn't finite.
-        let lift = if sum < F::of(1e-30) { F::of(1e30) } else { F::ONE };
-        let scale = F::ONE / (sum * lift);
+        let lift = F::select(F::of(1e-30).above(sum), F::of(1e30), F::ONE);
+        let scale = F::select(sum.above(F::ZERO), F::ONE / (sum * lift), F::ZERO);
         self.map(|estimate| estimate * lift * scale)
     }
 
@@ -63,7 +60,9 @@ impl<F: Real> Probabilities<F> {
             diffuse_transmission: f(self.diffuse_transmission),
         }
     }
+}
 
+impl<F: Real> Probabilities<F> {
     /// The sampler that `u` in [0, 1) stands for, and what is left of `u` as a number in [0, 1) for a choice within it.
     #[inline]
     pub(super) fn choose(&self, u: F) -> (Choice, F) {
@@ -90,6 +89,21 @@ fn equal_chance<F: Real>(estimate: F) -> F {
     if estimate > F::ZERO { F::ONE } else { F::ZERO }
 }
 
+impl<F: Number> Mixture<F> {
+    /// [`Self::estimates`] of what is reflected in front.
+    #[inline]
+    pub(super) fn estimates_of_reflection(&self, wo: V3<F>, split: &DielectricSplit<F>) -> Probabilities<F> {
+        let (mut cosine, uniform) = self.diffuse.as_ref().map_or((F::ZERO, F::ZERO), |d| d.albedos(wo));
+        if let Some(sheen) = &self.sheen {
+            cosine += sheen.albedo(wo);
+        }
+        let clearcoat = self.clearcoat.as_ref().map_or(F::ZERO, |coat| coat.albedo(wo));
+        let specular = self.specular.albedo(wo, split);
+        let (transmission, diffuse_transmission) = (F::ZERO, F::ZERO);
+        Probabilities { cosine, uniform, clearcoat, specular, transmission, diffuse_transmission }
+    }
+}
+
 impl<F: Real> Mixture<F> {
     /// Proportional to [`Self::estimates`], or equal where they are above 0.
     #[inline]
@@ -106,11 +120,6 @@ impl<F: Real> Mixture<F> {
         if wo.z < F::ZERO {
             return self.estimates_inside(wo);
         }
-        let (mut cosine, uniform) = self.diffuse.as_ref().map_or((F::ZERO, F::ZERO), |d| d.albedos(wo));
-        if let Some(sheen) = &self.sheen {
-            cosine += sheen.albedo(wo);
-        }
-        let clearcoat = self.clearcoat.as_ref().map_or(F::ZERO, |coat| coat.albedo(wo));
         let mut transmission = F::ZERO;
         let mut split = DielectricSplit::OPAQUE;
         let mut refracted = F::ZERO;
@@ -129,9 +138,14 @@ impl<F: Real> Mixture<F> {
                 }
             }
         }
-        let specular = self.specular.albedo(wo, &split) + refracted;
+        let reflected = self.estimates_of_reflection(wo, &split);
         let diffuse_transmission = self.diffuse_transmission.as_ref().map_or(F::ZERO, |d| d.albedo);
-        Probabilities { cosine, uniform, clearcoat, specular, transmission, diffuse_transmission }
+        Probabilities {
+            specular: reflected.specular + refracted,
+            transmission,
+            diffuse_transmission,
+            ..reflected
+        }
     }
 
     /// [`super::Bsdf::highlight`].

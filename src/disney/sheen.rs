@@ -1,9 +1,11 @@
 //! Sheen: a grazing component for cloth.
 
+use glam::Vec4;
+
 use super::pair::Pair;
 use super::parameter::Params;
 use crate::color::Rgb;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// The sheen term. It is broad, and sampled by the cosine together with the diffuse lobe.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +21,22 @@ impl<F: Real> Sheen<F> {
         let color = Rgb::WHITE.lerp(tint, params.sheen_tint) * strength;
         (!color.is_black()).then(|| Self { color, mean: color.mean() })
     }
+}
 
+impl Sheen<f32> {
+    /// The term that adds nothing.
+    pub(super) fn none(&self) -> Self {
+        Self { color: Rgb::BLACK, mean: 0.0 }
+    }
+
+    /// Four side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Sheen<Vec4> {
+        Sheen { color: Rgb::beside(four.map(|s| s.color)), mean: Vec4::from_array(four.map(|s| s.mean)) }
+    }
+}
+
+impl<F: Number> Sheen<F> {
     /// An estimate of the reflected part of light: a fit to the integral.
     #[inline]
     pub(super) fn albedo(&self, wo: V3<F>) -> F {

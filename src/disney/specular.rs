@@ -1,12 +1,14 @@
 //! The specular lobe: GTR2 with Schlick's Fresnel, blended with a dielectric's where the base is an interface.
 
+use glam::Vec4;
+
 use super::bound::hue;
 use super::fresnel::{DielectricSplit, Edge};
 use super::microfacet::{Alpha, Gtr2, alpha_from_roughness, smith};
 use super::pair::Pair;
 use super::parameter::{Masking, Params};
 use crate::color::Rgb;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// Reflection by the base layer.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +24,7 @@ pub(super) struct Specular<F> {
     pub(super) alpha: Alpha<F>,
     /// Of G.
     pub(super) masking_alpha: Alpha<F>,
-    masking: Masking,
+    pub(super) masking: Masking,
     roughness: F,
     // Coefficients of `albedo`: of the part that F0 reflects, and of the part that Schlick's weight adds.
     base: F,
@@ -101,7 +103,41 @@ impl<F: Real> Specular<F> {
             edge_spread: (F::of(4.0) * a).min(F::ONE),
         }
     }
+}
 
+impl Schlick<f32> {
+    /// Four side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Schlick<Vec4> {
+        Schlick { f0: Rgb::beside(four.map(|s| s.f0)), f90: Vec4::from_array(four.map(|s| s.f90)) }
+    }
+}
+
+impl Specular<f32> {
+    /// Four of the same [`Self::masking`], none of them a mirror, side by side.
+    #[inline(always)]
+    pub(super) fn beside(four: [&Self; 4]) -> Specular<Vec4> {
+        let each = |field: fn(&Self) -> f32| Vec4::from_array(four.map(field));
+        Specular {
+            f0: Rgb::beside(four.map(|s| s.f0)),
+            f90: each(|s| s.f90),
+            interface: each(|s| s.interface),
+            is_delta: false,
+            distribution: Gtr2::beside(four.map(|s| &s.distribution)),
+            alpha: Alpha::beside(four.map(|s| &s.alpha)),
+            masking_alpha: Alpha::beside(four.map(|s| &s.masking_alpha)),
+            masking: four[0].masking,
+            roughness: each(|s| s.roughness),
+            base: each(|s| s.base),
+            base_rise: each(|s| s.base_rise),
+            edge_share: each(|s| s.edge_share),
+            edge: each(|s| s.edge),
+            edge_spread: each(|s| s.edge_spread),
+        }
+    }
+}
+
+impl<F: Number> Specular<F> {
     /// An estimate of the reflected part of light: exact for a mirror, else a fit to the integral, rough where the lobe is dim. Never 0
     /// in front: light is reflected even where F0 is 0.
     #[inline]
@@ -129,18 +165,6 @@ impl<F: Real> Specular<F> {
     #[inline]
     pub(super) fn fresnel(&self, edge: Edge<F>, split: &DielectricSplit<F>) -> Rgb<F> {
         self.f0 * edge.rest + Rgb::grey(self.f90 * edge.weight + self.interface * split.reflectance)
-    }
-
-    /// The largest channel and the mean that Schlick's part of the Fresnel term reaches for cosines from `least` to 1; see `bound`.
-    pub(super) fn fresnel_bounds(&self, least: F) -> (F, F) {
-        let at = |cos_d| self.fresnel(Edge::at(cos_d), &DielectricSplit::OPAQUE);
-        let (level, edge) = (at(F::ONE), at(least));
-        (level.max_channel().max(edge.max_channel()), level.mean().max(edge.mean()))
-    }
-
-    /// The largest channel of F0 over its mean: adding grey makes it less.
-    pub(super) fn f0_hue(&self) -> F {
-        hue(self.f0)
     }
 
     /// What a smooth surface reflects of the light from the mirror direction.
@@ -175,6 +199,20 @@ impl<F: Real> Specular<F> {
             Masking::Matched => masking_o,
             Masking::Remapped => smith(wo, self.alpha),
         }
+    }
+}
+
+impl<F: Real> Specular<F> {
+    /// The largest channel and the mean that Schlick's part of the Fresnel term reaches for cosines from `least` to 1; see `bound`.
+    pub(super) fn fresnel_bounds(&self, least: F) -> (F, F) {
+        let at = |cos_d| self.fresnel(Edge::at(cos_d), &DielectricSplit::OPAQUE);
+        let (level, edge) = (at(F::ONE), at(least));
+        (level.max_channel().max(edge.max_channel()), level.mean().max(edge.mean()))
+    }
+
+    /// The largest channel of F0 over its mean: adding grey makes it less.
+    pub(super) fn f0_hue(&self) -> F {
+        hue(self.f0)
     }
 
     /// A visible normal, unit length.

@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 
 use super::EmissiveTriangle;
 use super::bounds::{Cone, LightBounds, angle};
-use crate::math::{Real, warp};
+use crate::math::{Number, Real, warp};
 use crate::scene::material::Sides;
 
 /// A patch whose radius is less than this fraction of the distance is sampled by area at once. Distances and cosines differ on it, but
@@ -222,10 +222,11 @@ impl Patch {
     #[inline]
     fn point_of_wedge(&self, u: [f32; 2]) -> (usize, [f32; 3]) {
         let first = self.wedges[0].share;
-        let (k, u0) = match self.count {
-            2 if u[0] >= first => (1, ((u[0] - first) / (1.0 - first)).min(1.0)),
-            _ => (0, u[0] / first),
-        };
+        // Without a branch: which wedge it is, is random.
+        let is_second = self.count == 2 && u[0] >= first;
+        let beyond = Number::select(is_second, u[0] - first, u[0]);
+        let width = Number::select(is_second, 1.0 - first, first);
+        let (k, u0) = (usize::from(is_second), (beyond / width).min(1.0));
         let [b1, b2] = warp::uniform_triangle([u0, u[1]]);
         (k, [1.0 - b1 - b2, b1, b2])
     }

@@ -290,6 +290,7 @@ mod tests {
     use crate::light::Gloss;
     use crate::light::bounds::Cone;
     use crate::math::Frame;
+    use crate::math::Number;
     use crate::math::hash::{combine, unit_f32};
     use crate::scene::material::Sides;
 

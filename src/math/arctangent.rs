@@ -2,6 +2,8 @@
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
+use super::Number;
+
 /// (arctan z - z)/z³ as a polynomial in z² for |z| ≤ tan π/8, from the lowest power: fitted to the least largest relative error of the
 /// angle, 2e-8.
 const TERMS: [f32; 4] = [-0.333_329_5, 0.199_777_04, -0.138_776_08, 0.080_534_76];
@@ -16,22 +18,18 @@ const TAN_EIGHTH: f32 = 0.414_213_57;
 #[inline]
 pub(super) fn atan2(y: f32, x: f32) -> f32 {
     let (across, along) = (y.abs(), x.abs());
-    let (less, more) = if across > along { (along, across) } else { (across, along) };
+    let choose = <f32 as Number>::select;
+    let (less, more) = (choose(across > along, along, across), choose(across > along, across, along));
     let is_steep = less > TAN_EIGHTH * more;
-    let (from, numerator, denominator) =
-        if is_steep { (FRAC_PI_4, less - more, less + more) } else { (0.0, less, more) };
+    let numerator = choose(is_steep, less - more, less);
+    let denominator = choose(is_steep, less + more, more);
     let z = if more > 0.0 { numerator / denominator } else { 0.0 };
     let square = z * z;
     let [c0, c1, c2, c3] = TERMS;
     let curve = ((c3 * square + c2) * square + c1) * square + c0;
-    let mut angle = from + (z + z * square * curve);
-    if across > along {
-        angle = FRAC_PI_2 - angle;
-    }
-    if x.is_sign_negative() {
-        angle = PI - angle;
-    }
-    angle.copysign(y)
+    let angle = choose(is_steep, FRAC_PI_4, 0.0) + (z + z * square * curve);
+    let angle = choose(across > along, FRAC_PI_2 - angle, angle);
+    choose(x.is_sign_negative(), PI - angle, angle).copysign(y)
 }
 
 #[cfg(test)]

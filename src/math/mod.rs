@@ -5,6 +5,7 @@
 mod arctangent;
 pub mod frame;
 pub mod hash;
+mod number;
 mod real;
 pub mod sobol;
 pub mod stats;
@@ -12,5 +13,6 @@ mod vec3;
 pub mod warp;
 
 pub use frame::Frame;
+pub use number::Number;
 pub use real::Real;
 pub use vec3::V3;

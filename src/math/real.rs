@@ -1,58 +1,21 @@
 //! The float type that shading code is generic over.
 
-use std::fmt::Debug;
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
-
-use super::arctangent;
+use super::{Number, arctangent};
 
 /// A float: `f32` in renders, `f64` as the twin that tests measure `f32` against.
 ///
 /// Square roots are the hardware's (IEEE 754 rounds them correctly everywhere); other functions are `libm`'s or our own, whose
 /// bits do not depend on the C library or the processor.
-pub trait Real:
-    Copy
-    + Debug
-    + Default
-    + PartialEq
-    + PartialOrd
-    + Send
-    + Sync
-    + 'static
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + AddAssign
-    + SubAssign
-    + MulAssign
-    + DivAssign
-{
-    /// Zero.
-    const ZERO: Self;
-    /// One.
-    const ONE: Self;
+pub trait Real: Number<Mask = bool> + PartialOrd {
     /// π.
     const PI: Self;
-    /// 1/π.
-    const FRAC_1_PI: Self;
     /// The distance from 1 to the next larger number.
     const EPSILON: Self;
     /// Terms of the series of sine and cosine, after the first, that a quarter of a turn needs.
     const QUARTER_TERMS: u32;
 
-    /// The nearest number of this type.
-    fn of(value: f64) -> Self;
     /// The value as `f64`, exact.
     fn to_f64(self) -> f64;
-    /// √self, correctly rounded.
-    fn sqrt(self) -> Self;
-    /// |self|.
-    fn abs(self) -> Self;
-    /// The larger of two; the other one where one is NaN.
-    fn max(self, other: Self) -> Self;
-    /// The smaller of two; the other one where one is NaN.
-    fn min(self, other: Self) -> Self;
     /// Neither infinite nor NaN.
     fn is_finite(self) -> bool;
     /// The sine of an angle in radians.
@@ -80,11 +43,6 @@ pub trait Real:
     fn to_f32(self) -> f32 {
         self.to_f64() as f32
     }
-    /// self².
-    #[inline]
-    fn sqr(self) -> Self {
-        self * self
-    }
     /// Sine and cosine of π/2·self for a self in [-1, 1], by their series, to an absolute error of an epsilon or two.
     #[inline]
     fn sin_cos_quarter(self) -> (Self, Self) {
@@ -99,61 +57,18 @@ pub trait Real:
         }
         (sin * x, cos)
     }
-    /// self⁵.
-    #[inline]
-    fn pow5(self) -> Self {
-        self.sqr().sqr() * self
-    }
-    /// self limited to [low, high].
-    #[inline]
-    fn clamp(self, low: Self, high: Self) -> Self {
-        self.max(low).min(high)
-    }
-    /// √max(self, 0): for differences that are non-negative in exact arithmetic.
-    #[inline]
-    fn safe_sqrt(self) -> Self {
-        self.max(Self::ZERO).sqrt()
-    }
-    /// self·(1 - t) + other·t.
-    #[inline]
-    fn lerp(self, other: Self, t: Self) -> Self {
-        self * (Self::ONE - t) + other * t
-    }
 }
 
 macro_rules! real {
     ($float:ident, $quarter_terms:literal, $sin:path, $cos:path, $ln:path, $exp:path, $pow:path, $atan2:path, $acos:path) => {
         impl Real for $float {
-            const ZERO: Self = 0.0;
-            const ONE: Self = 1.0;
             const PI: Self = std::$float::consts::PI;
-            const FRAC_1_PI: Self = std::$float::consts::FRAC_1_PI;
             const EPSILON: Self = $float::EPSILON;
             const QUARTER_TERMS: u32 = $quarter_terms;
 
             #[inline]
-            fn of(value: f64) -> Self {
-                value as $float
-            }
-            #[inline]
             fn to_f64(self) -> f64 {
                 f64::from(self)
-            }
-            #[inline]
-            fn sqrt(self) -> Self {
-                $float::sqrt(self)
-            }
-            #[inline]
-            fn abs(self) -> Self {
-                $float::abs(self)
-            }
-            #[inline]
-            fn max(self, other: Self) -> Self {
-                $float::max(self, other)
-            }
-            #[inline]
-            fn min(self, other: Self) -> Self {
-                $float::min(self, other)
             }
             #[inline]
             fn is_finite(self) -> bool {

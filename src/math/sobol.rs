@@ -186,7 +186,7 @@ impl Sampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Real;
+    use crate::math::Number;
 
     #[test]
     fn every_power_of_two_prefix_is_stratified_in_each_dimension() {

@@ -2,7 +2,9 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::Real;
+use glam::{BVec4A, Vec3, Vec4};
+
+use super::{Number, Real};
 
 /// A vector, usually a unit direction in the local frame whose z is the shading normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,7 +17,7 @@ pub struct V3<F> {
     pub z: F,
 }
 
-impl<F: Real> V3<F> {
+impl<F: Number> V3<F> {
     /// The vector (x, y, z).
     #[inline]
     pub fn new(x: F, y: F, z: F) -> Self {
@@ -56,12 +58,6 @@ impl<F: Real> V3<F> {
         self * (F::ONE / self.length())
     }
 
-    /// The same direction in another float type.
-    #[inline]
-    pub fn cast<G: Real>(self) -> V3<G> {
-        V3::new(G::of(self.x.to_f64()), G::of(self.y.to_f64()), G::of(self.z.to_f64()))
-    }
-
     /// Mirrored by the plane z = 0.
     #[inline]
     pub fn mirrored_z(self) -> Self {
@@ -78,21 +74,57 @@ impl<F: Real> V3<F> {
     }
 }
 
-impl From<glam::Vec3> for V3<f32> {
+impl<F: Real> V3<F> {
+    /// The same direction in another float type.
     #[inline]
-    fn from(v: glam::Vec3) -> Self {
+    pub fn cast<G: Real>(self) -> V3<G> {
+        V3::new(G::of(self.x.to_f64()), G::of(self.y.to_f64()), G::of(self.z.to_f64()))
+    }
+}
+
+impl V3<Vec4> {
+    /// Four vectors side by side.
+    #[inline(always)]
+    pub fn beside(four: [Vec3; 4]) -> Self {
+        let axis = |of: fn(&Vec3) -> f32| Vec4::from_array(four.each_ref().map(of));
+        Self::new(axis(|v| v.x), axis(|v| v.y), axis(|v| v.z))
+    }
+
+    /// The same vector in all lanes.
+    #[inline(always)]
+    pub fn splat(v: Vec3) -> Self {
+        Self::new(Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z))
+    }
+
+    /// The vector in a lane.
+    #[inline(always)]
+    pub fn lane(self, lane: usize) -> Vec3 {
+        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
+    }
+
+    /// `yes` where the mask says so, and `no` elsewhere.
+    #[inline(always)]
+    pub fn select(mask: BVec4A, yes: Self, no: Self) -> Self {
+        let choose = |yes: Vec4, no: Vec4| Vec4::select(mask, yes, no);
+        Self::new(choose(yes.x, no.x), choose(yes.y, no.y), choose(yes.z, no.z))
+    }
+}
+
+impl From<Vec3> for V3<f32> {
+    #[inline]
+    fn from(v: Vec3) -> Self {
         Self::new(v.x, v.y, v.z)
     }
 }
 
-impl From<V3<f32>> for glam::Vec3 {
+impl From<V3<f32>> for Vec3 {
     #[inline]
     fn from(v: V3<f32>) -> Self {
-        glam::Vec3::new(v.x, v.y, v.z)
+        Vec3::new(v.x, v.y, v.z)
     }
 }
 
-impl<F: Real> Add for V3<F> {
+impl<F: Number> Add for V3<F> {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
@@ -100,7 +132,7 @@ impl<F: Real> Add for V3<F> {
     }
 }
 
-impl<F: Real> Sub for V3<F> {
+impl<F: Number> Sub for V3<F> {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
@@ -108,7 +140,7 @@ impl<F: Real> Sub for V3<F> {
     }
 }
 
-impl<F: Real> Neg for V3<F> {
+impl<F: Number> Neg for V3<F> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
@@ -116,7 +148,7 @@ impl<F: Real> Neg for V3<F> {
     }
 }
 
-impl<F: Real> Mul<F> for V3<F> {
+impl<F: Number> Mul<F> for V3<F> {
     type Output = Self;
     #[inline]
     fn mul(self, factor: F) -> Self {

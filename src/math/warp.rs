@@ -1,6 +1,6 @@
 //! Maps from the unit square to shapes, each beside its pdf.
 
-use super::{Real, V3};
+use super::{Number, Real, V3};
 
 /// The unit disk, by Shirley and Chiu's concentric map (1997): area is preserved and neighbours stay neighbours.
 /// The pdf is 1/π per unit area.
@@ -13,10 +13,10 @@ pub fn concentric_disk<F: Real>(u: [F; 2]) -> [F; 2] {
     // The angle is π/4·y/x from the x axis in two of the square's quarters, π/4·x/y from the y axis in the others. Chosen without a
     // branch: the quarters are random.
     let along_x = x.abs() > y.abs();
-    let (radius, across) = if along_x { (x, y) } else { (y, x) };
+    let (radius, across) = (F::select(along_x, x, y), F::select(along_x, y, x));
     let (sin, cos) = (F::of(0.5) * (across / radius)).sin_cos_quarter();
     let (near, far) = (radius * cos, radius * sin);
-    if along_x { [near, far] } else { [far, near] }
+    [F::select(along_x, near, far), F::select(along_x, far, near)]
 }
 
 /// A direction of the upper hemisphere, by the cosine; its pdf is [`cosine_hemisphere_pdf`].
@@ -26,7 +26,7 @@ pub fn cosine_hemisphere<F: Real>(u: [F; 2]) -> V3<F> {
 }
 
 /// cos θ/π per unit solid angle, 0 below the horizon.
-pub fn cosine_hemisphere_pdf<F: Real>(cos_theta: F) -> F {
+pub fn cosine_hemisphere_pdf<F: Number>(cos_theta: F) -> F {
     cos_theta.max(F::ZERO) * F::FRAC_1_PI
 }
 
@@ -40,7 +40,7 @@ pub fn uniform_hemisphere<F: Real>(u: [F; 2]) -> V3<F> {
 }
 
 /// 1/2π per unit solid angle, above the horizon.
-pub fn uniform_hemisphere_pdf<F: Real>() -> F {
+pub fn uniform_hemisphere_pdf<F: Number>() -> F {
     F::of(0.5) * F::FRAC_1_PI
 }
 
@@ -55,13 +55,9 @@ pub fn uniform_sphere<F: Real>(u: [F; 2]) -> V3<F> {
 /// Barycentric coordinates (of the second and third vertex) of a point of a triangle, uniform by area, by Heitz' low-distortion
 /// map (2019, "A Low-Distortion Map Between Triangle and Square"). The pdf is 1/area.
 pub fn uniform_triangle(u: [f32; 2]) -> [f32; 2] {
-    let (mut b0, mut b1) = (u[0] * 0.5, u[1] * 0.5);
-    if u[1] > u[0] {
-        b1 = u[1] - b0;
-    } else {
-        b0 = u[0] - b1;
-    }
-    [b0, b1]
+    let (half_0, half_1) = (u[0] * 0.5, u[1] * 0.5);
+    let is_above = u[1] > u[0];
+    [Number::select(is_above, half_0, u[0] - half_1), Number::select(is_above, u[1] - half_0, half_1)]
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ use glam::Vec3;
 use super::Prepared;
 use super::surface::{Shading, Surface};
 use crate::accel::Ray;
+use crate::math::Number;
 
 /// The product without the light's own part, for a path from the camera; 0 where light paths don't find it.
 #[derive(Clone, Copy, Debug)]
@@ -73,10 +74,14 @@ impl FromLight {
         if self.ratio == 0.0 {
             return 0.0;
         }
-        let cosines = surface.geometric_cosine(wi) / surface.geometric_cosine(wo);
         let pdf_back = || back().map_or(0.0, |b| b.bsdf.pdf(b.wo, b.frame.local_from_world(wo)));
         let back = if self.scatterings == 0 { 1.0 } else { pdf_back() };
-        self.ratio * cosines * back
+        towards(self.ratio, surface.geometric_cosine(wi), surface.geometric_cosine(wo), back)
+    }
+
+    /// The product so far.
+    pub(super) fn ratio(&self) -> f32 {
+        self.ratio
     }
 
     /// The path was scattered with the density `pdf`; `towards` is what [`Self::towards`] said.
@@ -109,11 +114,19 @@ impl FromLight {
     }
 }
 
+/// [`FromLight::towards`] after a `ratio`: the cosines at the surface towards the light and the camera, and the density of sampling the way back
+/// from the light, 1 at the first surface.
+#[inline(always)]
+pub(super) fn towards<F: Number>(ratio: F, to_light: F, to_camera: F, back: F) -> F {
+    ratio * (to_light / to_camera) * back
+}
+
 /// `ratio` with the light's own part; where the ratio is 0, that is not asked for. What floats can't tell, beyond all bounds times nothing,
 /// counts as nothing.
 #[inline]
-pub(super) fn with_light(ratio: f32, emission: impl FnOnce() -> f32) -> f32 {
-    if ratio > 0.0 { (ratio * emission()).max(0.0) } else { 0.0 }
+pub(super) fn with_light<F: Number>(ratio: F, emission: impl FnOnce() -> F) -> F {
+    let is_found = ratio.above(F::ZERO);
+    if F::any(is_found) { F::select(is_found, (ratio * emission()).max(F::ZERO), F::ZERO) } else { F::ZERO }
 }
 
 /// Whether a delta lobe that sends a path to `wi` sends one from there to the viewer.

@@ -6,6 +6,7 @@
 
 use super::Prepared;
 use crate::light::{LightPlace, LightSample};
+use crate::math::Number;
 
 /// How light sampling and BSDF sampling share a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,55 +34,55 @@ impl Heuristic {
 
 /// How many times as densely as one of the camera's ways others find a light.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Rivals {
+pub(super) struct Rivals<F = f32> {
     /// The camera's other way.
-    pub(super) camera: f32,
-    pub(super) light_paths: f32,
+    pub(super) camera: F,
+    pub(super) light_paths: F,
     pub(super) heuristic: Heuristic,
 }
 
 /// What one of the camera's ways counts of a light.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Share {
+pub(super) struct Share<F = f32> {
     /// The weight against the camera's other way alone.
-    pub(super) in_camera: f32,
+    pub(super) in_camera: F,
     /// How many times as densely as both together light paths find the light.
-    pub(super) light_paths: f32,
+    pub(super) light_paths: F,
 }
 
-impl Share {
+impl<F: Number> Share<F> {
     /// Of what nothing else finds.
-    pub(super) const ALL: Self = Self { in_camera: 1.0, light_paths: 0.0 };
-    const NONE: Self = Self { in_camera: 0.0, light_paths: 0.0 };
+    pub(super) const ALL: Self = Self { in_camera: F::ONE, light_paths: F::ZERO };
+    const NONE: Self = Self { in_camera: F::ZERO, light_paths: F::ZERO };
 
     /// The weight against all.
     #[inline(always)]
-    pub(super) fn weight(self) -> f32 {
+    pub(super) fn weight(self) -> F {
         self.in_camera * power(self.light_paths)
     }
 }
 
-impl Rivals {
+impl<F: Number> Rivals<F> {
     #[inline(always)]
-    fn share(self) -> Share {
+    fn share(self) -> Share<F> {
         let in_camera = match self.heuristic {
             Heuristic::Power => power(self.camera),
-            Heuristic::Balance => 1.0 / (1.0 + self.camera),
+            Heuristic::Balance => F::ONE / (F::ONE + self.camera),
         };
         // Spares a root where there are no light paths.
-        if self.light_paths == 0.0 {
-            return Share { in_camera, light_paths: 0.0 };
+        if !F::any(self.light_paths.above(F::ZERO)) {
+            return Share { in_camera, light_paths: F::ZERO };
         }
         // Beyond all bounds over beyond all bounds is as good as nothing: the camera's own weight is next to nothing there.
-        let light_paths = (self.light_paths / (1.0 + self.camera * self.camera).sqrt()).max(0.0);
+        let light_paths = (self.light_paths / (F::ONE + self.camera.sqr()).sqrt()).max(F::ZERO);
         Share { in_camera, light_paths }
     }
 }
 
 /// The weight by the power heuristic with exponent 2 against what is `other` times as dense.
 #[inline(always)]
-pub(super) fn power(other: f32) -> f32 {
-    1.0 / (1.0 + other * other)
+pub(super) fn power<F: Number>(other: F) -> F {
+    F::ONE / (F::ONE + other.sqr())
 }
 
 /// Which of the camera's ways to find a light count. All combinations have the same expectation.
@@ -99,17 +100,20 @@ impl Strategies {
 
     /// What a path counts that met a light.
     #[inline(always)]
-    pub(super) fn of_bsdf(self, rivals: Rivals) -> Share {
+    pub(super) fn of_bsdf<F: Number>(self, rivals: Rivals<F>) -> Share<F> {
         match self {
             Self { nee: true, mis: true } => rivals.share(),
-            Self { nee: true, mis: false } if rivals.camera > 0.0 => Share::NONE,
-            _ => Share::ALL,
+            Self { nee: true, mis: false } => {
+                let is_chosen = rivals.camera.above(F::ZERO);
+                Share { in_camera: F::select(is_chosen, F::ZERO, F::ONE), ..Share::ALL }
+            }
+            Self { nee: false, .. } => Share::ALL,
         }
     }
 
     /// What a sample of a light counts that has an extent.
     #[inline(always)]
-    pub(super) fn of_light(self, rivals: Rivals) -> Share {
+    pub(super) fn of_light<F: Number>(self, rivals: Rivals<F>) -> Share<F> {
         match self {
             Self { nee: true, mis: true } => rivals.share(),
             Self { nee: true, mis: false } => Share::ALL,
@@ -189,6 +193,6 @@ mod tests {
         }
         // What light sampling can't find is left to BSDF sampling.
         let without_mis = Strategies { nee: true, mis: false };
-        assert_eq!(without_mis.of_bsdf(Rivals::default()).weight(), 1.0);
+        assert_eq!(without_mis.of_bsdf(Rivals::<f32>::default()).weight(), 1.0);
     }
 }

@@ -31,6 +31,7 @@ mod surface;
 mod techniques;
 mod tile;
 mod variants;
+mod viewers;
 
 use crate::accel::BuildError;
 

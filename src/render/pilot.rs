@@ -46,21 +46,25 @@ const SPREAD_OF_LIGHTS: f64 = 0.15;
 /// One block of pixels for so many that are looked at, to see what neighbours' paths bring.
 const LOOKS_PER_MEETING: u32 = 16;
 /// What a path costs that neighbours may join, and each that does, in rays as well: the shadow ray, and what the surfaces reflect. Measured:
-/// 2.4 to 4 for three neighbours, 0.6 to 1.1 for one more.
-const JOINABLE_COST: f64 = 1.0;
-const JOINING_COST: f64 = 0.85;
-/// Light paths, and blocks of eight instead of four, have to leave no more than this of the work, or they are not used: the ones take memory,
-/// the others make noise blotchier, both take time, and jobs of a sweep that do the same share more.
+/// 3 to 4 for three neighbours, 3.7 to 5.8 for seven, 5.8 to 10 for fifteen.
+const JOINABLE_COST: f64 = 2.4;
+const JOINING_COST: f64 = 0.3;
+/// Light paths, and blocks of more than eight, have to leave no more than this of the work, or they are not used: the ones take memory,
+/// the others make noise blotchier, and jobs of a sweep that do the same share more. Blocks of more than four have to save more where noisy
+/// parts of the picture could have more samples without them. Elsewhere there are none of four: eight take 0.7 to 1.0 of their work.
 const LEAST_GAIN: f64 = 0.92;
-const LEAST_GAIN_OF_LARGE: f64 = 0.87;
+const LEAST_GAIN_OF_LARGEST: f64 = 0.85;
+const LEAST_GAIN_OF_EVEN: f64 = 0.6;
 /// The noise that evenly spread points leave of what independent ones make, in the part of a path's light that its neighbours have no use for:
-/// emission and light sampled at the first surface. In the rest they are little better. Measured: from 0.2 on the shader ball to 1 on the statue.
-const SPREAD: f64 = 1.0 / 3.0;
+/// emission and light sampled at the first surface. In the rest they are little better. Measured: from 0.15 in the sun to 0.26 on the statue.
+const SPREAD: f64 = 0.2;
 
 /// Samples branch where at most so many rays follow each of the camera's, and at least so much of the variance comes from there. Measured, at
 /// equal time: 0.6 to 0.95 of the error where both hold, 1 and more where either does not.
 const MOST_RAYS_BEYOND: f64 = 0.4;
 const LEAST_BEYOND: f64 = 0.5;
+/// What branches leave of the work where path reuse is told from doing without it.
+const GAIN_OF_BRANCHES: f64 = 0.75;
 
 /// Noisy parts of a picture get more samples where at least this part of the camera's paths meets nothing. Elsewhere what equal numbers waste is
 /// about what pixels save that complete each other, as they only do with equal numbers. Measured: 0.3 to 0.9 of the error, against 0.85 to 1.06.
@@ -81,12 +85,12 @@ struct Look {
     unmet: u32,
 }
 
-/// A block of eight pixels that use each other's paths: the variances of one sample's part that neighbours can use, if none joins, and if
+/// A block of sixteen pixels that use each other's paths: the variances of one sample's part that neighbours can use, if none joins, and if
 /// those of each size of block do, summed up over the pixels.
 struct Meeting {
     cell: usize,
     alone: [f64; 3],
-    joined: [[f64; 3]; 2],
+    joined: [[f64; 3]; BlockSize::ALL.len()],
 }
 
 /// Two samples of a pixel with two branches each: the variances of what a sample finds, and of what it finds from its first surface on.
@@ -110,7 +114,7 @@ struct Worth {
     own: f64,
     shared: f64,
     /// What joining leaves of the rest, in blocks of each size.
-    left: [f64; 2],
+    left: [f64; BlockSize::ALL.len()],
     /// That of light paths.
     of_lights: f64,
     /// More error of camera paths without light paths, before neighbours share it.
@@ -139,9 +143,9 @@ impl Worth {
     fn of(&self, used: Used) -> (f64, f64) {
         let with = |left: f64| self.own * SPREAD + self.shared * left;
         let of_camera = with(used.path_reuse.map_or(1.0, |block| self.left[block as usize]));
-        // What path reuse leaves of the camera's error.
+        // What light paths save is often light by mirrors and glass, where neighbours cannot join: measured, from left² to its root.
         let left = if of_camera > 0.0 { of_camera / with(1.0) } else { 1.0 };
-        let of_light = if used.light_paths { self.of_lights } else { self.saved * left };
+        let of_light = if used.light_paths { self.of_lights } else { self.saved * left.sqrt() };
         let light_cost = if used.light_paths { self.light_cost } else { 0.0 };
         let of_path = |block: BlockSize| JOINABLE_COST + JOINING_COST * f64::from(block.pixels() - 1);
         let joining_cost = self.joinable * used.path_reuse.map_or(0.0, of_path);
@@ -152,8 +156,18 @@ impl Worth {
     fn work(&self, used: Used) -> f64 {
         let (error, cost) = self.of(used);
         let of_lights = if used.light_paths { LEAST_GAIN } else { 1.0 };
-        let of_size = if used.path_reuse == Some(BlockSize::Eight) { LEAST_GAIN_OF_LARGE } else { 1.0 };
-        error * cost / (of_lights * of_size)
+        let of_size = match used.path_reuse {
+            Some(size) if size.is_large() && self.can_be_uneven(used) => LEAST_GAIN_OF_EVEN,
+            Some(BlockSize::Sixteen) => LEAST_GAIN_OF_LARGEST,
+            _ => 1.0,
+        };
+        let of_branches = if self.splitting(used).is_ok() { GAIN_OF_BRANCHES } else { 1.0 };
+        error * cost * of_branches / (of_lights * of_size)
+    }
+
+    /// Noisy parts of the picture may get more samples, as far as the size of blocks lets them.
+    fn can_be_uneven(&self, used: Used) -> bool {
+        self.unmet >= LEAST_UNMET && !used.light_paths
     }
 
     /// Rays from the first surface on, for each of the camera's.
@@ -183,7 +197,7 @@ impl Worth {
         // Where these pay, light is found seldom, and what the first samples of a patch see tells little of its noise: error 2.2 through glass.
         if used.light_paths {
             Err("paths from the lights make less noise".to_owned())
-        } else if used.path_reuse == Some(BlockSize::Eight) {
+        } else if used.path_reuse.is_some_and(BlockSize::is_large) {
             Err("pixels of large blocks, which have equal numbers, use each other's paths".to_owned())
         } else if self.unmet < LEAST_UNMET {
             let full = 100.0 * (1.0 - self.unmet);
@@ -222,20 +236,23 @@ pub(super) fn choose(scene: &Prepared, can_reuse: bool, can_split: bool) -> Choi
         if with { is_possible } else { is_open || !is_possible }
     };
     let with_light = [false, true].into_iter().filter(|&with| may_be(light_is_open, can_light, with));
-    let sizes = [None, Some(BlockSize::Four), Some(BlockSize::Eight)];
+    let sizes = std::iter::once(None).chain(BlockSize::ALL.map(Some));
     // Pixels of a block have equal numbers of samples, and those of large ones would have too many.
     let is_adaptive = scene.adaptive.is_ok() && !adaptive_is_open;
-    let sizes = sizes.into_iter().filter(|&size| !(is_adaptive && size == Some(BlockSize::Eight)));
+    let sizes = sizes.filter(|size| !(is_adaptive && size.is_some_and(BlockSize::is_large)));
     let with_reuse = sizes.filter(|size| may_be(reuse_is_open, can_reuse, size.is_some()));
     let ways = with_light
         .flat_map(|light_paths| with_reuse.clone().map(move |path_reuse| Used { light_paths, path_reuse }));
+    let is_needed = |used: &Used| is_adaptive || worth.can_be_uneven(*used);
+    let ways = ways.filter(|used| used.path_reuse != Some(BlockSize::Four) || is_needed(used));
     let best = ways.min_by(|&a, &b| worth.work(a).total_cmp(&worth.work(b)));
     let Some(best) = best else { return choice };
     if light_is_open && !best.light_paths {
         choice.light_paths = Err(format!("they {}", worth.told(Used { light_paths: true, ..best }, best)));
     }
     choice.path_reuse = best.path_reuse.ok_or_else(|| {
-        let with = Used { path_reuse: Some(BlockSize::Four), ..best };
+        let size = if is_needed(&best) { BlockSize::Four } else { BlockSize::Eight };
+        let with = Used { path_reuse: Some(size), ..best };
         format!("it {}", worth.told(with, best))
     });
     if adaptive_is_open {
@@ -392,22 +409,22 @@ fn look(scene: &Prepared, index: u32, can_reuse: bool) -> Look {
     }
 }
 
-/// Takes two samples of a block of eight pixels; none if the picture is too small for one.
+/// Takes two samples of a block of sixteen pixels; none if the picture is too small for one.
 fn meet(scene: &Prepared, index: u32) -> Option<Meeting> {
-    let ((width, height), (columns, rows)) = (scene.size(), BlockSize::Eight.sides());
+    let ((width, height), (columns, rows)) = (scene.size(), BlockSize::Sixteen.sides());
     let [u, v, ..] = sampler(scene, MEETING_PLACES, index, 1).set(0, Purpose::Camera);
     let start = |u: f32, length: u32, side: u32| {
         let blocks = length / side;
         (blocks > 0).then(|| ((u * blocks as f32) as u32).min(blocks - 1) * side)
     };
     let corner = (start(u, width, columns)?, start(v, height, rows)?);
-    // The two blocks of four one after the other.
+    // The four blocks of four one after the other, and so those of eight.
     let sides = BlockSize::Four.sides();
-    let halves = [corner, (corner.0 + sides.0, corner.1)];
-    let places = halves.into_iter().flat_map(|half| block_around(half, sides, scene.size()));
+    let quarters = [(0, 0), (sides.0, 0), (0, sides.1), sides].map(|(x, y)| (corner.0 + x, corner.1 + y));
+    let places = quarters.into_iter().flat_map(|quarter| block_around(quarter, sides, scene.size()));
     let places: SmallVec<[_; MOST]> = places.collect();
     // Each pixel's part that others can use, in blocks of so many.
-    let sample = |sample: u32| -> [[[f64; 3]; MOST]; 3] {
+    let sample = |sample: u32| -> [[[f64; 3]; MOST]; 1 + BlockSize::ALL.len()] {
         let walk = |(pixel, &(x, y)): (usize, &(u32, u32))| {
             let set = MEETING_PLACES + 1 + index * MOST as u32 + pixel as u32;
             let sampler = sampler(scene, set, sample, 2);
@@ -417,7 +434,8 @@ fn meet(scene: &Prepared, index: u32) -> Option<Meeting> {
             walk
         };
         let walks: SmallVec<[Walk; MOST]> = places.iter().enumerate().map(walk).collect();
-        [1, BlockSize::Four.pixels() as usize, MOST].map(|size| {
+        std::array::from_fn(|way| {
+            let size = if way == 0 { 1 } else { BlockSize::ALL[way - 1].pixels() as usize };
             let mut parts = [[0.0; 3]; MOST];
             for (block, parts) in walks.chunks(size).zip(parts.chunks_mut(size)) {
                 gather(scene, block, |(pixel, found)| {
@@ -434,10 +452,10 @@ fn meet(scene: &Prepared, index: u32) -> Option<Meeting> {
             |c: usize| a[way].iter().zip(&b[way]).map(move |(a, b)| (a[c] - b[c]) * (a[c] - b[c]) / 2.0);
         std::array::from_fn(|c| halves(c).sum())
     };
-    let [alone, four, eight] = [0, 1, 2].map(variance);
-    let is_usable = alone.iter().chain(&four).chain(&eight).all(|v| v.is_finite());
+    let (alone, joined) = (variance(0), std::array::from_fn(|size| variance(1 + size)));
+    let is_usable = joined.iter().chain([&alone]).flatten().all(|v| v.is_finite());
     let cell = cell(scene, Vec2::new(corner.0 as f32, corner.1 as f32) + 0.5);
-    is_usable.then_some(Meeting { cell, alone, joined: [four, eight] })
+    is_usable.then_some(Meeting { cell, alone, joined })
 }
 
 /// Takes two samples of a pixel that branch; none if they are no numbers.

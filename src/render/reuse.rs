@@ -18,18 +18,20 @@
 //! each other is a function of each pixel's whole path, as it is without neighbours ([`super::from_light`]); the shares of the block sum to 1 in
 //! each of the three ways. A viewer whose BSDF is black there, at x₁ or x₂, would have ended its own path: it has no share.
 
-use glam::Vec3;
+use glam::{BVec4A, Vec3, Vec4};
 use smallvec::SmallVec;
 
 use super::Prepared;
-use super::direct::{Arriving, pdf_emission, transmittance};
+use super::direct::{Arriving, pdf_emission};
 use super::from_light::{FromLight, with_light};
 use super::mis::{Heuristic, Rivals, Share, Strategies, power};
 use super::path::{PathSample, Walk};
 use super::surface::{Shading, Surface};
+use super::viewers::{LANES, Second, Seen, Viewers, Views, usual};
 use crate::accel::{Hit, Ray};
 use crate::color::Rgb;
 use crate::light::LightSample;
+use crate::math::Number;
 
 /// The pixels of a block: tiles are made of whole ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,21 +40,29 @@ pub(super) enum BlockSize {
     Four,
     /// Four columns of two: less noise still where neighbours see alike, for more rays.
     Eight,
+    /// Four of four: the least noise.
+    Sixteen,
 }
 
 /// The most pixels of a block.
-pub(super) const MOST: usize = BlockSize::Eight.pixels() as usize;
+pub(super) const MOST: usize = BlockSize::Sixteen.pixels() as usize;
 
 impl BlockSize {
     /// All of them, in the order of their numbers.
-    pub(super) const ALL: [Self; 2] = [Self::Four, Self::Eight];
+    pub(super) const ALL: [Self; 3] = [Self::Four, Self::Eight, Self::Sixteen];
 
     /// Columns and rows.
     pub(super) const fn sides(self) -> (u32, u32) {
         match self {
             Self::Four => (2, 2),
             Self::Eight => (4, 2),
+            Self::Sixteen => (4, 4),
         }
+    }
+
+    /// Its pixels cannot have numbers of samples of their own.
+    pub(super) fn is_large(self) -> bool {
+        self != Self::Four
     }
 
     pub(super) const fn pixels(self) -> u32 {
@@ -186,36 +196,11 @@ impl Onward {
     }
 }
 
-/// A first surface.
-struct Viewer<'a> {
-    surface: &'a Surface<'a>,
-    shading: Shading<'a>,
-    from_light: FromLight,
-}
-
-/// How a viewer sees a second surface.
-struct View<'a> {
-    /// Whose it is.
-    pixel: usize,
-    /// From the second surface to the viewer.
-    wo: Vec3,
-    /// The viewer's f·|cos θ₁|·G.
-    f: Rgb,
-    /// The density of the second surface's place, per area there.
-    density: f32,
-    from_light: FromLight,
-    shading: Shading<'a>,
-}
-
-/// How a viewer sees light that a second surface reflects.
-struct Seen<'v, 'a> {
-    view: &'v View<'a>,
-    /// f·|cos θ₂|.
-    f: Rgb,
-    /// The density of its direction.
-    pdf: f32,
-    /// How light paths find it ([`FromLight::towards`]).
-    towards: f32,
+/// What four pixels of a block found.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    radiance: Rgb<Vec4>,
+    rays: [u64; LANES],
 }
 
 impl Walk {
@@ -231,193 +216,148 @@ impl Walk {
 }
 
 /// Gives what each path of a block found by itself and by joining the others, with its place in the block.
-#[inline]
-pub(super) fn gather(scene: &Prepared, block: &[Walk], found: impl FnMut((usize, &PathSample))) {
-    // Few paths in arrays for many would be slow.
+pub(super) fn gather(scene: &Prepared, block: &[Walk], mut found: impl FnMut((usize, &PathSample))) {
+    if !block.iter().any(Walk::is_lit_beyond) {
+        return block.iter().enumerate().for_each(|(pixel, walk)| found((pixel, &walk.path())));
+    }
     match block.len() {
-        0..=4 => gathered::<4>(scene, block).iter().take(block.len()).enumerate().for_each(found),
-        _ => gathered::<MOST>(scene, block).iter().take(block.len()).enumerate().for_each(found),
+        0..=4 => joined::<1>(scene, block, found),
+        5..=8 => joined::<2>(scene, block, found),
+        _ => joined::<4>(scene, block, found),
     }
 }
 
-fn gathered<const PIXELS: usize>(scene: &Prepared, block: &[Walk]) -> [PathSample; PIXELS] {
-    // Written where they stay: samples handed on would be copied several times, each waiting for the last.
-    let mut samples = [PathSample::default(); PIXELS];
-    for (sample, walk) in samples.iter_mut().zip(block) {
-        *sample = walk.path();
+/// The same where there is something to join, in a block of so many times four.
+fn joined<const FOURS: usize>(scene: &Prepared, block: &[Walk], mut found: impl FnMut((usize, &PathSample))) {
+    let joined = radiances::<FOURS>(scene, block);
+    for (pixel, walk) in block.iter().enumerate() {
+        let (own, Found { radiance, rays }) = (walk.path(), joined[pixel / LANES]);
+        let rays = own.rays + rays[pixel % LANES];
+        found((pixel, &PathSample { radiance: radiance.lane(pixel % LANES), rays, ..own }));
     }
-    if !block.iter().any(Walk::is_lit_beyond) {
-        return samples;
-    }
-    let mut firsts: [Option<Surface<'_>>; PIXELS] = [const { None }; PIXELS];
-    for (first, walk) in firsts.iter_mut().zip(block) {
+}
+
+/// The radiance of all paths of a block, and the rays that joining them took.
+#[inline(always)]
+fn radiances<const FOURS: usize>(scene: &Prepared, block: &[Walk]) -> [Found; FOURS] {
+    let mut found: [Found; FOURS] = std::array::from_fn(|four| {
+        let own =
+            |lane: usize| block.get(four * LANES + lane).map_or(Rgb::BLACK, |walk| walk.path().radiance);
+        Found { radiance: Rgb::beside(std::array::from_fn(own)), rays: [0; LANES] }
+    });
+    let mut firsts: [[Option<Surface<'_>>; LANES]; FOURS] = [const { [const { None }; LANES] }; FOURS];
+    let mut varying = [const { [const { None }; LANES] }; FOURS];
+    for (walk, first) in block.iter().zip(firsts.as_flattened_mut()) {
         *first = walk.trail.first.as_ref().map(|met| Surface::new(scene, &met.ray, &met.hit));
     }
-    let mut varying = [None; PIXELS];
-    let mut viewers: [Option<Viewer<'_>>; PIXELS] = [const { None }; PIXELS];
-    for ((viewer, walk), (first, varying)) in
-        viewers.iter_mut().zip(block).zip(firsts.iter().zip(&mut varying))
-    {
-        if let (Some(surface), Some(met)) = (first, &walk.trail.first) {
-            *viewer = surface.shading(scene, varying).map(|shading| {
-                let mut from_light = FromLight::CAMERA;
-                from_light.arrive(scene, &met.ray, surface);
-                Viewer { surface, shading, from_light }
-            });
-        }
-    }
+    let mut rest = block.iter().zip(firsts.as_flattened().iter().zip(varying.as_flattened_mut()));
+    let mut viewer = || {
+        let (walk, (surface, varying)) = rest.next()?;
+        let (surface, met) = (surface.as_ref()?, walk.trail.first.as_ref()?);
+        let shading = surface.shading(scene, varying)?;
+        let mut from_light = FromLight::CAMERA;
+        from_light.arrive(scene, &met.ray, surface);
+        Some((surface, shading, from_light))
+    };
+    let viewers: [Viewers<'_>; FOURS] =
+        std::array::from_fn(|_| Viewers::new(std::array::from_fn(|_| viewer())));
     for (own, walk) in block.iter().enumerate() {
-        join(scene, &viewers, own, walk, &mut samples);
+        join(scene, &viewers, own, walk, &mut found);
     }
-    samples
+    found
 }
 
 /// Joins the viewers to the second surface of `walk`, the path of the viewer `own`.
-fn join<const PIXELS: usize>(
+#[inline(always)]
+fn join<const FOURS: usize>(
     scene: &Prepared,
-    viewers: &[Option<Viewer<'_>>; PIXELS],
+    viewers: &[Viewers<'_>; FOURS],
     own: usize,
     walk: &Walk,
-    samples: &mut [PathSample; PIXELS],
+    found: &mut [Found; FOURS],
 ) {
     let trail = &walk.trail;
     let (direct, onward) = (&trail.direct, walk.lit_onward());
     let Some(met) = trail.second.filter(|_| direct.is_some() || onward.is_some()) else { return };
-    let second = Surface::new(scene, &met.ray, &met.hit);
+    let surface = Surface::new(scene, &met.ray, &met.hit);
     let mut varying = None;
-    let Some(shading) = second.shading(scene, &mut varying) else { return };
-    let Some(viewer) = &viewers[own] else { return };
-    let own_view = viewer.own_view(scene, own, trail, &second, shading);
-    let is_alone = !is_usual(own_view.density);
-    let own_view = if is_alone { View { f: trail.weight, density: 1.0, ..own_view } } else { own_view };
-    let mut views: [Option<View<'_>>; PIXELS] = [const { None }; PIXELS];
-    if !is_alone {
-        for (pixel, (view, viewer)) in views.iter_mut().zip(viewers).enumerate() {
-            if let Some(viewer) = viewer
-                && pixel != own
-            {
-                *view = viewer.view(scene, pixel, &second, &shading, &mut samples[pixel].rays);
-            }
+    let Some(shading) = surface.shading(scene, &mut varying) else { return };
+    let (own_four, own_lane) = (own / LANES, own % LANES);
+    let Some(first) = viewers[own_four].surface(own_lane) else { return };
+    let second = Second::new(&surface, shading);
+    let geometry = surface.geometric_cosine(surface.wo) / surface.point.distance_squared(first.point);
+    let density = trail.pdf * geometry;
+    let is_alone = !usual(density);
+    let own_view = if is_alone { (trail.weight, 1.0) } else { (trail.weight * density, density) };
+    let views: [Views; FOURS] = std::array::from_fn(|four| {
+        let is_own = four == own_four;
+        let except = is_own.then_some(own_lane);
+        let mut views = match is_alone {
+            true => Views::NONE,
+            false => viewers[four].views(scene, &second, except, &mut found[four].rays),
+        };
+        if is_own {
+            views.set_own(&viewers[four], own_lane, &second, own_view, trail.pdf);
         }
-    }
-    views[own] = Some(own_view);
-    let seen = |wi: Vec3, of_own: (Rgb, f32)| {
-        // Light paths come to all viewers from the same side.
-        let back = if scene.light_paths.is_ok() { second.shading_from(scene, &shading, wi) } else { None };
-        let mut all: [Option<Seen<'_, '_>>; PIXELS] = [const { None }; PIXELS];
-        for (seen, view) in all.iter_mut().zip(&views) {
-            if let Some(view) = view {
-                let reflected = if view.pixel == own { of_own } else { second.reflected(&view.shading, wi) };
-                *seen = view.seen(&second, wi, reflected, back);
-            }
-        }
-        all
+        views
+    });
+    let seen = |wi: Vec3, of_own: (Rgb, f32)| -> [Seen; FOURS] {
+        let back = second.seen_from_light(scene, wi);
+        std::array::from_fn(|four| {
+            let known = (four == own_four).then_some((own_lane, of_own));
+            second.seen(&views[four], wi, back.as_ref(), known)
+        })
     };
     let strategies = Strategies::of(scene);
     if let Some(direct) = direct {
         let seen = seen(direct.wi, direct.reflected);
-        let density: f32 = seen.iter().flatten().map(|seen| seen.view.density).sum();
-        for Seen { view, f, pdf, towards } in seen.into_iter().flatten() {
+        let density = sum(views.iter().zip(&seen).map(|(views, seen)| (views.density, seen.are_there)));
+        let (pdf, emission) = (Vec4::splat(direct.pdf), Vec4::splat(direct.emission));
+        let scale = Vec4::ONE / Vec4::splat(density * direct.pdf);
+        for ((views, seen), found) in views.iter().zip(&seen).zip(found.iter_mut()) {
             let share = direct.heuristic.map_or(Share::ALL, |heuristic| {
-                let light_paths = with_light(towards, || direct.emission) / direct.pdf;
-                strategies.of_light(Rivals { camera: pdf / direct.pdf, light_paths, heuristic })
+                let light_paths = with_light(seen.towards, || emission) / pdf;
+                strategies.of_light(Rivals { camera: seen.pdf / pdf, light_paths, heuristic })
             });
-            let scale = share.weight() / (density * direct.pdf);
-            samples[view.pixel].radiance += view.f * f * direct.radiance * scale;
+            let radiance = Rgb::splat(direct.radiance) * (share.weight() * scale);
+            found.add(views.f * seen.f * radiance, seen.are_there);
         }
     }
     if let Some(onward) = onward {
         let seen = seen(onward.wi, onward.reflected);
-        let density: f32 = seen.iter().flatten().map(|seen| seen.view.density * seen.pdf).sum();
-        for Seen { view, f, pdf, towards } in seen.into_iter().flatten().filter(|seen| seen.pdf > 0.0) {
-            let way = towards / pdf;
-            let (camera, heuristic) = (onward.pdf_light / pdf, onward.heuristic);
-            let rivals = Rivals { camera, light_paths: with_light(way, || onward.emission), heuristic };
-            let mut radiance = walk.beyond() + onward.met * strategies.of_bsdf(rivals).weight();
+        let are_possible = |seen: &Seen| seen.are_there & seen.pdf.above(Vec4::ZERO);
+        let densities =
+            views.iter().zip(&seen).map(|(views, seen)| (views.density * seen.pdf, are_possible(seen)));
+        let density = Vec4::splat(sum(densities));
+        for ((views, seen), found) in views.iter().zip(&seen).zip(found.iter_mut()) {
+            let way = seen.towards / seen.pdf;
+            let rivals = Rivals {
+                camera: Vec4::splat(onward.pdf_light) / seen.pdf,
+                light_paths: with_light(way, || Vec4::splat(onward.emission)),
+                heuristic: onward.heuristic,
+            };
+            let met = Rgb::splat(onward.met) * strategies.of_bsdf(rivals).weight();
+            let mut radiance = Rgb::splat(walk.beyond()) + met;
             for later in &trail.later {
-                radiance += later.radiance * power(with_light(way, || later.light_paths));
+                let share = power(with_light(way, || Vec4::splat(later.light_paths)));
+                radiance += Rgb::splat(later.radiance) * share;
             }
-            samples[view.pixel].radiance += view.f * f * radiance / density;
+            found.add(views.f * seen.f * radiance / density, are_possible(seen));
         }
     }
 }
 
-/// A density of which products and quotients are numbers. A path whose own is none stays its pixel's alone, and no pixel has a share by one.
-#[inline]
-fn is_usual(density: f32) -> bool {
-    (1e-20..1e20).contains(&density)
-}
-
-impl Viewer<'_> {
-    /// How the path's own pixel sees its second surface.
+impl Found {
+    /// Adds radiance that some of them find.
     #[inline(always)]
-    fn own_view<'s>(
-        &self,
-        scene: &Prepared,
-        pixel: usize,
-        trail: &Trail,
-        second: &Surface<'_>,
-        shading: Shading<'s>,
-    ) -> View<'s> {
-        let wo = second.wo;
-        let distance_squared = second.point.distance_squared(self.surface.point);
-        let density = trail.pdf * second.geometric_cosine(wo) / distance_squared;
-        let from_light = self.towards(scene, -wo, trail.pdf);
-        View { pixel, wo, f: trail.weight * density, density, from_light, shading }
-    }
-
-    /// How another path's second surface is seen, if it is.
-    #[inline(always)]
-    fn view<'s>(
-        &self,
-        scene: &Prepared,
-        pixel: usize,
-        second: &Surface<'_>,
-        shading: &Shading<'s>,
-        rays: &mut u64,
-    ) -> Option<View<'s>> {
-        let first = self.surface;
-        let way = second.point - first.point;
-        let distance_squared = way.length_squared();
-        let wi = way / distance_squared.sqrt();
-        if !(first.same_side(wi) && second.same_side(-wi)) {
-            return None;
-        }
-        let (f, pdf) = first.reflected(&self.shading, wi);
-        let geometry = second.geometric_cosine(wi) / distance_squared;
-        let density = pdf * geometry;
-        if f.is_black() || !is_usual(density) {
-            return None;
-        }
-        let shading = second.shading_from(scene, shading, -wi)?;
-        *rays += 1;
-        if transmittance(scene, &first.reach(wi, second.leave(-wi).origin)).is_black() {
-            return None;
-        }
-        let from_light = self.towards(scene, wi, pdf);
-        Some(View { pixel, wo: -wi, f: f * geometry, density, from_light, shading })
-    }
-
-    /// What light paths know of the way to a second surface, sampled with the density `pdf`.
-    #[inline(always)]
-    fn towards(&self, scene: &Prepared, wi: Vec3, pdf: f32) -> FromLight {
-        let mut from_light = self.from_light;
-        from_light.scatter(from_light.towards(scene, self.surface, &self.shading, wi), pdf);
-        from_light
+    fn add(&mut self, radiance: Rgb<Vec4>, who: BVec4A) {
+        self.radiance += radiance.map(|channel| Vec4::select(who, channel, Vec4::ZERO));
     }
 }
 
-impl<'a> View<'a> {
-    /// How it sees light from `wi`, if any is reflected; from there the second surface is seen as `back` says.
-    #[inline(always)]
-    fn seen(
-        &self,
-        second: &Surface<'_>,
-        wi: Vec3,
-        (f, pdf): (Rgb, f32),
-        back: Option<Shading<'a>>,
-    ) -> Option<Seen<'_, 'a>> {
-        let towards = || self.from_light.towards_for(second, self.wo, wi, || back);
-        (!f.is_black()).then(|| Seen { view: self, f, pdf, towards: towards() })
-    }
+/// The sum over all lanes of what is there: one after the other, so that every machine rounds alike.
+#[inline(always)]
+fn sum(fours: impl Iterator<Item = (Vec4, BVec4A)>) -> f32 {
+    let there = fours.map(|(four, are_there)| Vec4::select(are_there, four, Vec4::ZERO));
+    there.flat_map(|four| four.to_array()).sum()
 }

@@ -38,7 +38,7 @@ pub(super) struct Shading<'s> {
     /// The viewer in the frame.
     pub(super) wo: V3<f32>,
     /// The frame is not the one that others see the point in: it was turned to this viewer.
-    is_turned: bool,
+    pub(super) is_turned: bool,
 }
 
 impl<'a> Surface<'a> {
@@ -66,6 +66,12 @@ impl<'a> Surface<'a> {
     #[inline]
     pub(super) fn seen_from(&self, wo: Vec3) -> Self {
         Self { wo, is_front: self.is_before(wo), ..*self }
+    }
+
+    /// The geometric normal of the front side.
+    #[inline]
+    pub(super) fn normal(&self) -> Vec3 {
+        self.normal
     }
 
     /// |cos| between a unit direction and the geometric normal.
@@ -123,6 +129,12 @@ impl<'a> Surface<'a> {
     #[inline]
     fn shows(&self, normal: Vec3, w: Vec3, is_front: bool) -> bool {
         (w.dot(normal) > 0.0) == (is_front || !self.material.is_interface)
+    }
+
+    /// The viewer's shading normal points to its side: not inside an interface.
+    #[inline]
+    pub(super) fn is_seen_in_front(&self) -> bool {
+        self.is_front || !self.material.is_interface
     }
 
     #[inline]

@@ -111,6 +111,7 @@ impl<'a> Variants<'a> {
         match first.path_reuse {
             Ok(BlockSize::Four) => return self.sample_block::<4>(going, block, sample, found),
             Ok(BlockSize::Eight) => return self.sample_block::<8>(going, block, sample, found),
+            Ok(BlockSize::Sixteen) => return self.sample_block::<16>(going, block, sample, found),
             Err(_) if first.splitting.is_ok() => {
                 return self.sample_block::<1>(going, block, sample, found);
             }

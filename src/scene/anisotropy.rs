@@ -6,7 +6,7 @@ use super::material::{Param, TextureMap};
 use super::texture::Texel;
 use super::{Material, Scene};
 use crate::disney::Parameter;
-use crate::math::Real;
+use crate::math::{Number, Real};
 
 /// KHR_materials_anisotropy where its terms vary over the surface, or the roughness that they belong to does. Disney's roughness and
 /// anisotropic follow from both by [`Self::disney`] at each point; where nothing varies a conversion does that once.
@@ -43,8 +43,8 @@ impl AnisotropyMap {
     /// t = a + (1-a)·strength² along the tangent, Disney's alphas roughness²/aspect and roughness²·aspect are t and a for
     /// roughness = (t·a)^¼ and anisotropic = (1 - a/t)/0.9.
     pub fn disney(roughness: f32, strength: f32) -> DisneyAnisotropy {
-        let a = Real::sqr(roughness);
-        let t = a + (1.0 - a) * Real::sqr(strength);
+        let a = Number::sqr(roughness);
+        let t = a + (1.0 - a) * Number::sqr(strength);
         let ratio = if t > 0.0 { a / t } else { 1.0 };
         DisneyAnisotropy { roughness: (t * a).sqrt().sqrt(), anisotropic: (1.0 - ratio) / 0.9 }
     }

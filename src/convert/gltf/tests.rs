@@ -138,7 +138,7 @@ fn anisotropy_gives_gltfs_two_alphas() {
         let (material, notes) = run(&source);
         // The parametrisation of disney.brdf.
         let aspect = (1.0 - 0.9 * scalar(&material, Parameter::Anisotropic)).sqrt();
-        let r2 = Real::sqr(scalar(&material, Parameter::Roughness));
+        let r2 = Number::sqr(scalar(&material, Parameter::Roughness));
         let a = roughness * roughness;
         let t = a + (1.0 - a) * strength * strength;
         assert!((r2 / aspect - t).abs() < 1e-5, "along the tangent");

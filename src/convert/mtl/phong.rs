@@ -5,7 +5,7 @@ use crate::color::Rgb;
 use crate::convert::tint::fit_tint;
 use crate::convert::{PhongRoughness, Quality};
 use crate::disney::{Model, Parameter};
-use crate::math::Real;
+use crate::math::Number;
 use crate::scene::material::{Curve, Param, TextureChannel, TextureMap};
 use crate::scene::source::MtlSlot;
 

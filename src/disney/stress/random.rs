@@ -5,7 +5,7 @@ use crate::color::Rgb;
 use crate::disney::dielectric::refracted;
 use crate::disney::fresnel::dielectric_split;
 use crate::disney::{DiffuseModel, Lobe, Masking, Model, Parameter, Params};
-use crate::math::{Real, V3, hash};
+use crate::math::{Number, Real, V3, hash};
 
 /// Numbers in [0, 1) from a seed and a running count.
 pub(in crate::disney) struct Random {
@@ -113,7 +113,7 @@ impl Random {
         params
     }
 
-    pub(super) fn material(&mut self) -> Material {
+    pub(in crate::disney) fn material(&mut self) -> Material {
         let model = match self.bits() % 32 {
             0 => Model::Diffuse,
             1 => Model::Mirror,
@@ -129,7 +129,7 @@ impl Random {
     }
 
     /// A unit vector from either side, half the time with a cosine spread evenly in its logarithm down to 10⁻⁷.
-    pub(super) fn view(&mut self) -> V3<f32> {
+    pub(in crate::disney) fn view(&mut self) -> V3<f32> {
         let z = match self.bits() % 8 {
             0..=3 => self.log_uniform(7.0),
             4 => 1.0 - self.log_uniform(7.0),

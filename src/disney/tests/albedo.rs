@@ -11,7 +11,7 @@ use crate::disney::sheen::Sheen;
 use crate::disney::specular::{Schlick, Specular};
 use crate::disney::{DiffuseModel, Masking, Params};
 use crate::math::warp::uniform_sphere;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// ∫ f·|cos| dω of a material's lobes that aren't deltas, by quadrature in `f64`.
 pub(super) fn quadrature(material: &Twin, wo: V3<f32>, tolerance: f64) -> f64 {
@@ -57,7 +57,7 @@ fn importance_sampled_albedo_is_the_integral() {
 fn uniform_estimate(material: &Twin, wo: V3<f32>, samples: u32) -> (f64, f64) {
     let integral = quadrature(material, wo, 1e-5);
     let grid = Sphere::new(wo.cast(), material.ior);
-    let square = grid.total(1e-3, &|wi| Real::sqr(material.double.eval(wo.cast(), wi).mean() * wi.z));
+    let square = grid.total(1e-3, &|wi| Number::sqr(material.double.eval(wo.cast(), wi).mean() * wi.z));
     (integral, ((4.0 * f64::PI * square - integral * integral) / f64::from(samples)).sqrt())
 }
 

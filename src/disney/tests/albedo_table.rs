@@ -9,7 +9,7 @@ use super::albedo::{estimate, quadrature};
 use super::{Random, Twin};
 use crate::color::Rgb;
 use crate::disney::{DiffuseModel, Masking, Params};
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 const ROUGHNESSES: [f32; 12] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 const COSINES: [f32; 6] = [1.0, 0.8, 0.5, 0.2, 0.1, 0.02];
@@ -117,9 +117,9 @@ fn a_white_metal_seen_head_on_has_its_closed_form() {
         let sum: f64 = (0..n)
             .map(|i| {
                 let c = 0.5 + 0.5 * (f64::from(i) + 0.5) / f64::from(n);
-                let pi_d = alpha2 / Real::sqr(1.0 + (alpha2 - 1.0) * c);
+                let pi_d = alpha2 / Number::sqr(1.0 + (alpha2 - 1.0) * c);
                 let cos_light = 2.0 * c - 1.0;
-                let tan2 = 1.0 / Real::sqr(cos_light) - 1.0;
+                let tan2 = 1.0 / Number::sqr(cos_light) - 1.0;
                 pi_d * 2.0 / (1.0 + (1.0 + alpha2 * tan2).sqrt())
             })
             .sum();

@@ -3,7 +3,7 @@
 use super::Random;
 use crate::color::Rgb;
 use crate::disney::{Bsdf, BsdfSample, Lobe, fresnel_dielectric};
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// What a sample multiplies radiance with.
 fn weight(s: &BsdfSample<f64>) -> f64 {

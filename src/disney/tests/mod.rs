@@ -12,7 +12,7 @@ mod transmission;
 use super::stress::Random;
 use super::{Bsdf, DiffuseModel, Masking, Parameter, Params};
 use crate::color::Rgb;
-use crate::math::{Real, V3};
+use crate::math::{Number, Real, V3};
 
 /// What the tests draw; the stress suite draws more at the extremes.
 impl Random {

@@ -3,7 +3,7 @@
 use super::{Random, views};
 use crate::color::Rgb;
 use crate::disney::{Bsdf, Lobe, Params, fresnel_dielectric};
-use crate::math::{Real, V3};
+use crate::math::{Number, V3};
 
 fn glass(roughness: f64, ior: f64, thin_walled: bool) -> Bsdf<f64> {
     let params = Params {

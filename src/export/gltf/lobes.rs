@@ -6,7 +6,7 @@ use crate::color::Rgb;
 use crate::convert::{F0_OF_SPECULAR, Quality, disney_luminance, f0_of_ior};
 use crate::disney::{BASE_COLOR, Masking, Parameter};
 use crate::export::rounding::reads_back_as;
-use crate::math::Real;
+use crate::math::Number;
 use crate::scene::AnisotropyMap;
 use crate::scene::material::{Curve, Material, Param, TextureChannel, TextureMap};
 use crate::scene::source::{
@@ -207,7 +207,7 @@ fn anisotropy(c: &mut Conversion<'_>) {
     let aspect = (1.0 - 0.9 * anisotropic).sqrt();
     let is_textured = c.out.metallic_roughness_texture.is_some();
     let roughness = f64::from(c.out.roughness_factor);
-    let a = if is_textured { Real::sqr(roughness) } else { Real::sqr(roughness) * aspect };
+    let a = if is_textured { Number::sqr(roughness) } else { Number::sqr(roughness) * aspect };
     let t = a / (aspect * aspect);
     let strength = if a < 1.0 { ((t - a) / (1.0 - a)).clamp(0.0, 1.0).sqrt() } else { 0.0 };
     if !is_textured {

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::accessor::Accessors;
 use super::error::GltfError;
-use crate::math::Real;
+use crate::math::Number;
 
 const EXTENSION: &str = "EXT_mesh_gpu_instancing";
 
@@ -57,8 +57,10 @@ pub(super) fn transforms(
         };
         let (translation, scale) = (vector(&translations, DVec3::ZERO), vector(&scales, DVec3::ONE));
         let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |r| DQuat::from_array(r[i].map(f64::from)));
-        let length =
-            Real::sqr(rotation.x) + Real::sqr(rotation.y) + Real::sqr(rotation.z) + Real::sqr(rotation.w);
+        let length = Number::sqr(rotation.x)
+            + Number::sqr(rotation.y)
+            + Number::sqr(rotation.z)
+            + Number::sqr(rotation.w);
         if !(length.is_finite() && length > 0.0 && translation.is_finite() && scale.is_finite()) {
             let expected = "finite numbers, and quaternions that are not 0";
             return Err(GltfError::Invalid { element: element.clone(), property: "attributes", expected });

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use super::error::GltfError;
 use super::material::{Limits, Reader, parse};
 use crate::color::{Rgb, srgb_from_linear};
-use crate::math::Real;
+use crate::math::Number;
 use crate::scene::Image;
 use crate::scene::material::TextureMap;
 use crate::scene::source::GltfMaterial;
@@ -91,7 +91,7 @@ fn solve(diffuse: Rgb, specular: Rgb) -> Solved {
     let metallic = solve_metallic(brightness(diffuse), brightness(specular), rest);
     let of_diffuse = diffuse.map(|d| d * rest / (1.0 - DIELECTRIC) / (1.0 - metallic).max(EPSILON));
     let of_specular = specular.map(|s| (s - DIELECTRIC * (1.0 - metallic)) / metallic.max(EPSILON));
-    let base_color = of_diffuse.lerp(of_specular, Real::sqr(metallic)).map(|c| c.clamp(0.0, 1.0));
+    let base_color = of_diffuse.lerp(of_specular, Number::sqr(metallic)).map(|c| c.clamp(0.0, 1.0));
     Solved { base_color: base_color.cast(), metallic: metallic as f32 }
 }
 

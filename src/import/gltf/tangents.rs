@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bevy_mikktspace::{Ops, TangentSpace, generate_tangents};
 use glam::{Vec3, Vec4};
 
-use crate::math::Real;
+use crate::math::{Number, Real};
 use crate::scene::Mesh;
 
 /// The most triangles around a vertex: the algorithm goes round them recursively.
@@ -56,7 +56,7 @@ enum OwnOps {}
 
 impl Ops for OwnOps {
     fn sqrt(x: f32) -> f32 {
-        Real::sqrt(x)
+        Number::sqrt(x)
     }
 
     fn acos(x: f32) -> f32 {
