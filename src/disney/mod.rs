@@ -4,7 +4,8 @@
 //! of that sampler side by side; `probabilities` is the one place that says how often each lobe is sampled, and `bound` how large the
 //! weights of samples get by that.
 //!
-//! Everything is generic over [`crate::math::Real`], so that the `f64` twin the tests measure against is the same source.
+//! Everything is generic over [`crate::math::Real`], so that the `f64` twin the tests measure against is the same source; and what is
+//! reflected over [`crate::math::Number`], so that four surfaces side by side ([`FourBsdfs`]) are, too.
 
 mod bound;
 mod bsdf;

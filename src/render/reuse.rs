@@ -2,7 +2,7 @@
 //!
 //! A path x₀ (camera), x₁, x₂, … of one pixel is nearly as good for its neighbours: each joins their first surfaces x₁ to its x₂ (Bekaert,
 //! Sbert and Halton 2002). So a pixel gets the light of all paths of its block for some shadow rays more, and its noise of indirect light falls
-//! to little more than a block's share; neighbours' noise is alike then.
+//! to little more than a block's share; neighbours' noise is alike then. Four first surfaces join side by side ([`super::viewers`]).
 //!
 //! It stays free of bias by multiple importance sampling, with the first surfaces of the block as given. Those that see x₂ from the same side
 //! could each have sent a path there: with the densities pᵢ of BSDF sampling, times Gᵢ = |cos θ₂|/d², per area at x₂, pixel i counts of the path
