@@ -84,11 +84,10 @@ impl FourBsdfs {
             self.disney.as_ref().map_or((Rgb::BLACK, Vec4::ZERO), |disney| disney.opaque(wo, wi));
         if let Some((color, are_lambert)) = self.lambert {
             let is_seen = wo.z.above(Vec4::ZERO) & wi.z.above(Vec4::ZERO);
-            let seen = |value: Vec4| Vec4::select(is_seen, value, Vec4::ZERO);
-            let choose = |lambert: Vec4, other: Vec4| Vec4::select(are_lambert, seen(lambert), other);
-            let lambert = color * Vec4::FRAC_1_PI;
-            f = Rgb::new(choose(lambert.r, f.r), choose(lambert.g, f.g), choose(lambert.b, f.b));
-            pdf = choose(cosine_hemisphere_pdf(wi.z), pdf);
+            let lambert = Rgb::select(is_seen, color * Vec4::FRAC_1_PI, Rgb::BLACK);
+            let pdf_lambert = Vec4::select(is_seen, cosine_hemisphere_pdf(wi.z), Vec4::ZERO);
+            f = Rgb::select(are_lambert, lambert, f);
+            pdf = Vec4::select(are_lambert, pdf_lambert, pdf);
         }
         (f, pdf)
     }

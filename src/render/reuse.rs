@@ -351,7 +351,7 @@ impl Found {
     /// Adds radiance that some of them find.
     #[inline(always)]
     fn add(&mut self, radiance: Rgb<Vec4>, who: BVec4A) {
-        self.radiance += radiance.map(|channel| Vec4::select(who, channel, Vec4::ZERO));
+        self.radiance += Rgb::select(who, radiance, Rgb::BLACK);
     }
 }
 

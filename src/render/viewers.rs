@@ -61,8 +61,8 @@ pub(super) struct Views {
 
 /// A second surface that viewers are joined to.
 pub(super) struct Second<'a> {
-    pub(super) surface: &'a Surface<'a>,
-    pub(super) shading: Shading<'a>,
+    surface: &'a Surface<'a>,
+    shading: Shading<'a>,
     bsdfs: FourBsdfs,
 }
 
@@ -329,8 +329,8 @@ fn reflected(
     let (mut f, mut pdf) = (Rgb::BLACK, Vec4::ZERO);
     if asked_bits & bsdfs.has() != 0 {
         let (f_all, pdf_all) = bsdfs.eval_with_pdf(wo, wi);
-        let there = |value: Vec4| Vec4::select(asked, value, Vec4::ZERO);
-        (f, pdf) = ((f_all * wi.z.abs()).map(there), there(pdf_all));
+        f = Rgb::select(asked, f_all * wi.z.abs(), Rgb::BLACK);
+        pdf = Vec4::select(asked, pdf_all, Vec4::ZERO);
     }
     for lane in bits(asked_bits & !bsdfs.has()) {
         let (f_one, pdf_one) = by_one(lane);
