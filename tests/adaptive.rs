@@ -4,10 +4,11 @@ mod common;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::time::Duration;
 
 use common::lit::{
     assert_same_means, assert_same_on_any_threads, bottled, covered, dull, error_and_rays, lamp, leaning,
-    open, prepared, rendered, shiny,
+    open, prepared, rendered, rendered_within, shiny,
 };
 use common::technique::{ADAPTIVE, assert_not_used, assert_replayed, plain, why_not};
 use common::{lambert, metal, scene, small};
@@ -52,21 +53,25 @@ fn rare_light_is_not_lost_by_plans() {
     let mut parts = vec![(common::square(2.0, 0.0), lambert(0.6)), lamp()];
     parts.push((common::lit::ball(0.5, Vec3::new(-0.5, 0.5, 0.0)), metal(0.15)));
     let world = Arc::new(scene(parts, common::lit::camera()));
-    let total = |settings: &RenderSettings, seeds: std::ops::Range<u64>| {
-        let totals =
-            seeds.map(|seed| common::mean(&rendered(&world, &RenderSettings { seed, ..settings.clone() })));
-        let totals: Vec<f64> = totals.collect();
+    let total = |settings: &RenderSettings, limit, seeds: std::ops::Range<u64>| {
+        let of_seed = |seed| {
+            common::mean(&rendered_within(limit, &world, &RenderSettings { seed, ..settings.clone() }))
+        };
+        let totals: Vec<f64> = seeds.map(of_seed).collect();
         let n = totals.len() as f64;
         let mean = totals.iter().sum::<f64>() / n;
         let variance = totals.iter().map(|t| (t - mean) * (t - mean)).sum::<f64>() / (n * (n - 1.0));
         (mean, variance)
     };
-    let short = planned(RenderSettings { width: Some(16), height: Some(12), ..plain(16) });
-    let even = RenderSettings { width: Some(16), height: Some(12), ..plain(512) };
-    let ((a, va), (b, vb)) = (total(&short, 0..2000), total(&even, 10_000..10_100));
-    let sigma = (va + vb).sqrt();
-    assert!(sigma < 0.004 * b, "or the test could not fail: {b} ± {sigma}");
-    assert!((a - b).abs() < 3.5 * sigma, "{a} {b} ± {sigma}");
+    let tiny = |spp| RenderSettings { width: Some(16), height: Some(12), ..plain(spp) };
+    let (b, vb) = total(&tiny(512), None, 10_000..10_100);
+    // With a limit of time one plan follows the other: for 32 samples, for 64 and for 128.
+    for (spp, limit, seeds) in [(16, None, 2000), (128, Some(Duration::from_secs(3600)), 400)] {
+        let (a, va) = total(&planned(tiny(spp)), limit, 0..seeds);
+        let sigma = (va + vb).sqrt();
+        assert!(sigma < 0.004 * b, "or the test could not fail: {b} ± {sigma}");
+        assert!((a - b).abs() < 3.5 * sigma, "{spp}: {a} {b} ± {sigma}");
+    }
 }
 
 #[test]
@@ -114,6 +119,28 @@ fn in_the_open_plans_take_noise_away_for_as_many_rays() {
     assert_eq!(numbers.iter().map(|&n| u64::from(n)).sum::<u64>(), picture.counts.paths);
     let (sky, ball) = (numbers[0], numbers[24 * 64 + 32]);
     assert!(sky == 8 && ball > 32, "{sky} {ball}");
+}
+
+/// Though nobody knows how many there will be.
+#[test]
+fn in_the_open_a_limit_of_time_leaves_samples_to_what_is_noisy() {
+    let world = Arc::new(open(0.5));
+    let settings = planned(RenderSettings { width: Some(64), height: Some(48), ..plain(1 << 16) });
+    let numbers = samples(&rendered_within(Some(Duration::from_secs(2)), &world, &settings));
+    let (sky, ball) = (numbers[0], numbers[24 * 64 + 32]);
+    assert!(sky >= 16 && ball >= 8 * sky, "{sky} {ball}");
+}
+
+#[test]
+fn with_time_to_spare_a_limit_changes_no_bit_of_a_plan_that_begins_alike() {
+    let world = Arc::new(open(0.5));
+    for spp in [24, 64] {
+        let settings = planned(RenderSettings { width: Some(64), height: Some(48), ..plain(spp) });
+        let limited = rendered_within(Some(Duration::from_secs(3600)), &world, &settings);
+        let unlimited = rendered(&world, &settings);
+        assert_eq!(limited.raster, unlimited.raster, "{spp}");
+        assert_eq!(limited.counts.paths, unlimited.counts.paths);
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ use glam::Vec2;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-use super::adaptive::Plan;
+use super::adaptive::{Plan, Sight};
 use super::integrators::integrate;
 use super::light_image::LightImage;
 use super::path::PathSample;
@@ -75,7 +75,7 @@ pub fn render_together(
     let mut stacks: Vec<Vec<Tile>> =
         Tile::all(first).into_iter().map(|tile| vec![tile; scenes.len()]).collect();
     let mut lit: Vec<LightImage> = scenes.iter().map(|scene| LightImage::new(scene)).collect();
-    let mut plans: Vec<Option<Plan>> = scenes.iter().map(|_| None).collect();
+    let (mut sights, mut plans): (Vec<Sight>, Vec<Plan>) = (Vec::new(), Vec::new());
     let deadline = control.time_limit.map(|limit| Instant::now() + limit);
     for level in levels(first, deadline.is_some()) {
         // Every tile gets its first samples, also after the deadline: a picture has no holes.
@@ -83,9 +83,17 @@ pub fn render_together(
         if is_late() && stacks.iter().flatten().all(|tile| tile.samples > 0) {
             break;
         }
+        if let Some(aim) = level.aim {
+            plans = sights.iter().map(|sight| Plan::new(sight, aim)).collect();
+        }
+        if level.is_last && !plans.is_empty() {
+            control
+                .total_paths
+                .store(paths_in_all(&plans, scenes, &stacks, &lit, control), Ordering::Relaxed);
+        }
         for (variant, (lit, scene)) in lit.iter_mut().zip(scenes).enumerate() {
             if stacks.iter().any(|stack| !stack[variant].is_finished) {
-                lit.sample_up_to(scene, level.samples.min(first.settings.spp), control)?;
+                lit.sample_up_to(scene, level.samples, control)?;
             }
         }
         // One by one: rayon would leave a run of tiles to one thread while the others are done.
@@ -93,17 +101,10 @@ pub fn render_together(
             let ends = is_late() && stack.iter().all(|tile| tile.samples > 0);
             if ends { Ok(()) } else { sample_up_to(variants, stack, level, &plans, &lit, control) }
         })?;
-        if level.is_planned_after && !is_late() {
-            for (variant, plan) in plans.iter_mut().enumerate() {
-                let seen = stacks.iter().flat_map(|stack| stack[variant].seen(&lit[variant]));
-                *plan = Some(Plan::new(Tile::patches_of(first.size()), seen, &first.settings));
-            }
-            let planned = plans.iter().flatten().enumerate().map(|(variant, plan)| {
-                let of_lights = light_paths(scenes[variant]).saturating_sub(lit[variant].paths);
-                of_lights + stacks.iter().map(|stack| stack[variant].paths_to(plan)).sum::<u64>()
-            });
-            let done = control.paths.load(Ordering::Relaxed);
-            control.total_paths.store(done + planned.sum::<u64>(), Ordering::Relaxed);
+        if level.is_looked_at {
+            let size = Tile::patches_of(first.size());
+            let seen = |variant: usize, lit| stacks.iter().flat_map(move |stack| stack[variant].seen(lit));
+            sights = (0..).zip(&lit).map(|(variant, lit)| Sight::new(size, seen(variant, lit))).collect();
         }
     }
     for (variant, (scene, lit)) in scenes.iter().zip(&lit).enumerate() {
@@ -119,6 +120,21 @@ fn most_paths(scene: &Prepared) -> u64 {
     u64::from(width) * u64::from(height) * u64::from(scene.settings.spp) + light_paths(scene)
 }
 
+/// Those that there will have been when each pixel has what is planned.
+fn paths_in_all(
+    plans: &[Plan],
+    scenes: &[&Prepared],
+    stacks: &[Vec<Tile>],
+    lit: &[LightImage],
+    control: &Control,
+) -> u64 {
+    let planned = plans.iter().enumerate().map(|(variant, plan)| {
+        let of_lights = light_paths(scenes[variant]).saturating_sub(lit[variant].paths);
+        of_lights + stacks.iter().map(|stack| stack[variant].paths_to(plan)).sum::<u64>()
+    });
+    control.paths.load(Ordering::Relaxed) + planned.sum::<u64>()
+}
+
 fn light_paths(scene: &Prepared) -> u64 {
     scene.light_paths.as_ref().map_or(0, |plan| plan.paths(scene.settings.spp))
 }
@@ -128,7 +144,7 @@ fn sample_up_to(
     variants: &Variants<'_>,
     tiles: &mut [Tile],
     level: Level,
-    plans: &[Option<Plan>],
+    plans: &[Plan],
     lit: &[LightImage],
     control: &Control,
 ) -> Result<(), RenderError> {
@@ -136,7 +152,7 @@ fn sample_up_to(
     let going: Vec<usize> = (0..tiles.len()).filter(|&variant| !tiles[variant].is_finished).collect();
     let Some(&any) = going.first() else { return Ok(()) };
     for &variant in &going {
-        tiles[variant].begin(settings, level.samples, plans[variant].as_ref());
+        tiles[variant].begin(settings, level.samples, plans.get(variant));
     }
     let blocks: Vec<Block> = tiles[any].blocks(variants.block_sides()).collect();
     for block in &blocks {

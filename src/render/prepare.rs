@@ -184,9 +184,7 @@ impl Prepared {
 
     /// No pixel has more samples than this.
     pub fn most_samples(&self) -> u32 {
-        let adaptive =
-            self.adaptive.as_ref().ok().and_then(|()| adaptive::later_samples(&self.settings).last());
-        adaptive.unwrap_or(self.settings.spp)
+        if self.is_adaptive() { adaptive::most_samples(self.settings.spp) } else { self.settings.spp }
     }
 
     /// Noisy parts of the picture get more samples than others.

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
 
 use super::Prepared;
-use super::adaptive::{self, Plan};
+use super::adaptive::{self, Aim, Plan};
 use super::light_image::LightImage;
 use super::path::PathSample;
 use super::reuse;
@@ -109,30 +109,34 @@ pub(super) struct Tile {
 /// Where a render may stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Level {
-    /// Of each pixel, where no less are planned.
+    /// Of each pixel, where no others are planned.
     pub(super) samples: u32,
-    /// How many each is to have is planned now.
-    pub(super) is_planned_after: bool,
+    /// How many each pixel is to have is planned for this level.
+    pub(super) aim: Option<Aim>,
+    /// Plans are made by what is seen now.
+    pub(super) is_looked_at: bool,
     pub(super) is_last: bool,
 }
 
 /// The levels of a render: several, each of about twice the samples of the last, where it may end early, by the time or an error.
 pub(super) fn levels(scene: &Prepared, has_time_limit: bool) -> Vec<Level> {
-    let settings = &scene.settings;
-    let (first, mut levels) = match scene.adaptive {
-        Ok(()) => {
-            let first = adaptive::first_samples(settings);
-            (Some(first), doubled(settings.parts(), first).chain(adaptive::later_samples(settings)).collect())
-        }
-        Err(_) => (None, doubled(settings.parts(), settings.spp).collect::<Vec<u32>>()),
+    let (spp, parts) = (scene.settings.spp, scene.settings.parts());
+    let first = scene.adaptive.is_ok().then(|| adaptive::first_samples(spp, has_time_limit));
+    let unplanned = doubled(parts, first.unwrap_or(spp));
+    let mut numbers: Vec<u32> = match first {
+        Some(first) => unplanned.chain(adaptive::planned_means(spp, first)).collect(),
+        None => unplanned.collect(),
     };
-    let most = levels.last().copied();
-    if !has_time_limit && settings.error.is_none() {
-        levels.retain(|&samples| Some(samples) == most || Some(samples) == first);
+    if !has_time_limit && scene.settings.error.is_none() {
+        numbers.retain(|&samples| samples == spp || Some(samples) == first);
     }
-    let level =
-        |samples| Level { samples, is_planned_after: Some(samples) == first, is_last: Some(samples) == most };
-    levels.into_iter().map(level).collect()
+    let level = |samples| Level {
+        samples,
+        aim: first.filter(|&first| samples > first).map(|first| Aim { spp, first, mean: samples }),
+        is_looked_at: Some(samples) == first,
+        is_last: samples == spp,
+    };
+    numbers.into_iter().map(level).collect()
 }
 
 /// Numbers of samples, each twice the last, up to the most.
@@ -187,7 +191,7 @@ impl Tile {
         ((y - self.y0) / PATCH * PATCHES + (x - self.x0) / PATCH) as usize
     }
 
-    /// Makes ready for as many as `samples` of each pixel, or less where less are planned.
+    /// Makes ready for `samples` of each pixel, or for those that are planned.
     pub(super) fn begin(&mut self, settings: &RenderSettings, samples: u32, plan: Option<&Plan>) {
         let area = self.area() as usize;
         self.sums.resize(area, Sums::default());
@@ -198,7 +202,7 @@ impl Tile {
         for index in 0..self.patches.len() {
             let planned = plan.and_then(|plan| plan.samples(self.in_picture(index as u32)));
             let patch = &mut self.patches[index];
-            patch.goal = planned.map_or(samples, |planned| planned.min(samples));
+            patch.goal = planned.map_or(samples, |planned| planned.max(patch.samples));
             patch.second_half = is_halved.then(|| second_half(patch.goal));
         }
     }

@@ -1,6 +1,7 @@
 //! Scenes in which light takes every kind of way, and whether two ways to render one have the same expectation.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use glam::{Vec2, Vec3};
 use pipeline::color::Rgb;
@@ -188,10 +189,19 @@ pub(crate) fn prepared(world: &Scene, settings: &RenderSettings) -> Prepared {
 }
 
 pub(crate) fn rendered(world: &Arc<Scene>, settings: &RenderSettings) -> Rendered {
+    rendered_within(None, world, settings)
+}
+
+pub(crate) fn rendered_within(
+    time_limit: Option<Duration>,
+    world: &Arc<Scene>,
+    settings: &RenderSettings,
+) -> Rendered {
     let prepared = prepared(world, settings);
     assert_eq!(prepared.has_light_paths(), settings.light_paths != Use::Never);
     assert_eq!(prepared.has_path_reuse(), settings.path_reuse != Use::Never);
-    let rendered = render(&prepared, &Control::default()).expect("rendered");
+    let control = Control { time_limit, ..Control::default() };
+    let rendered = render(&prepared, &control).expect("rendered");
     assert_eq!(rendered.counts.bad_samples, 0, "{:?} {settings:?}", rendered.counts.first_bad_samples);
     rendered
 }
