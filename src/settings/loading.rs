@@ -33,7 +33,8 @@ pub enum DecodedImages {
     /// Those of all materials: what writes materials needs them, whoever wears them.
     #[default]
     OfMaterials,
-    /// Those of materials that an instance may wear: no ray meets the others. Their files aren't even read.
+    /// Those of materials that an instance may wear, as no ray meets the others, where factors don't make nothing of them. The files of others
+    /// aren't even read.
     OfInstances,
 }
 

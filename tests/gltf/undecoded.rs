@@ -7,6 +7,7 @@ use std::sync::Arc;
 use pipeline::convert::ConvertOptions;
 use pipeline::import::{DecodedImages, ImportError, ImportOptions, Imported, import_bytes};
 use pipeline::job::load;
+use pipeline::raster::Raster;
 use pipeline::render::{Control, Prepared, render};
 use pipeline::scene::{Image, MaterialId, Scene};
 use pipeline::settings::RenderSettings;
@@ -138,23 +139,101 @@ fn files_that_nothing_samples_are_not_read() {
     assert_eq!(names, ["s.glb", "worn.png"]);
 }
 
+/// The bits of a small picture, and the bytes of decoded images, the sky's included.
+fn picture(bytes: &[u8]) -> (Raster, u64) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.glb");
+    std::fs::write(&path, bytes).unwrap();
+    let loaded = load(&path, &ImportOptions::default(), &ConvertOptions::default(), None).unwrap();
+    let settings = RenderSettings { width: Some(16), height: Some(16), spp: 4, ..RenderSettings::default() };
+    let prepared = Prepared::new(Arc::clone(&loaded.scene), Arc::clone(&loaded.geometry), &settings).unwrap();
+    let images = loaded.scene.images.iter().map(|image| image.bytes()).sum();
+    (render(&prepared, &Control::default()).unwrap().raster, images)
+}
+
 #[test]
 fn a_picture_has_the_same_bits_without_the_spare_texture() {
-    let folder = tempfile::tempdir().unwrap();
-    let picture = |bytes: &[u8]| {
-        let path = folder.path().join("s.glb");
-        std::fs::write(&path, bytes).unwrap();
-        let loaded = load(&path, &ImportOptions::default(), &ConvertOptions::default(), None).unwrap();
-        let settings =
-            RenderSettings { width: Some(16), height: Some(16), spp: 4, ..RenderSettings::default() };
-        let prepared =
-            Prepared::new(Arc::clone(&loaded.scene), Arc::clone(&loaded.geometry), &settings).unwrap();
-        let images: u64 = loaded.scene.images.iter().map(|image| image.bytes()).sum();
-        (render(&prepared, &Control::default()).unwrap().raster, images)
-    };
     let (with, bytes_with) = picture(&embedded(&png(2), &png(2048), |_| ()));
     let without = embedded(&png(2), &png(1), |json| json["materials"][0] = json!({"name": "spare"}));
     let (without, bytes_without) = picture(&without);
     assert_eq!(with, without);
     assert_eq!(bytes_with, bytes_without);
+}
+
+/// Each field of glTF that has a texture and a factor, with a factor of 0.
+fn factors_of_nothing() -> Vec<(&'static str, Value)> {
+    let texture = json!({"index": 1});
+    let extension = |name: &'static str, value: Value| (name, json!({"extensions": {name: value}}));
+    vec![
+        ("emissiveTexture", json!({"emissiveTexture": texture})),
+        ("normalTexture", json!({"normalTexture": {"index": 1, "scale": 0.0}})),
+        (
+            "metallicRoughnessTexture",
+            json!({"pbrMetallicRoughness": {
+                "metallicFactor": 0.0, "roughnessFactor": 0.0, "metallicRoughnessTexture": texture
+            }}),
+        ),
+        extension(
+            "KHR_materials_specular",
+            json!({"specularFactor": 0.0, "specularTexture": texture,
+                "specularColorFactor": [0, 0, 0], "specularColorTexture": texture}),
+        ),
+        extension(
+            "KHR_materials_clearcoat",
+            json!({"clearcoatTexture": texture, "clearcoatRoughnessTexture": texture}),
+        ),
+        extension("KHR_materials_sheen", json!({"sheenColorTexture": texture})),
+        extension("KHR_materials_anisotropy", json!({"anisotropyTexture": texture})),
+        extension("KHR_materials_transmission", json!({"transmissionTexture": texture})),
+        extension(
+            "KHR_materials_diffuse_transmission",
+            json!({"diffuseTransmissionTexture": texture, "diffuseTransmissionColorFactor": [0, 0, 0],
+                "diffuseTransmissionColorTexture": texture}),
+        ),
+    ]
+}
+
+/// The material without its textures.
+fn without_textures(material: &Value) -> Value {
+    match material {
+        Value::Object(fields) => {
+            let kept = fields.iter().filter(|(name, _)| !name.ends_with("Texture"));
+            kept.map(|(name, value)| (name.clone(), without_textures(value))).collect()
+        }
+        other => other.clone(),
+    }
+}
+
+#[test]
+fn what_a_factor_makes_nothing_of_is_not_decoded() {
+    for (field, material) in factors_of_nothing() {
+        let file =
+            |material: Value| embedded(&png(2), &png(64), |json| json["materials"] = json!([{}, material]));
+        let bytes = file(material.clone());
+        let (with, decoded) = picture(&bytes);
+        assert_eq!((with, decoded), picture(&file(without_textures(&material))), "{field}");
+        // Who wants the materials for themselves gets it.
+        assert_eq!(read("s.glb", &bytes).unwrap().scene.images.len(), 1, "{field}");
+    }
+}
+
+/// A factor that is not 0 is enough; and the image of one texture may be needed by another.
+#[test]
+fn what_a_factor_leaves_is_decoded() {
+    let (_, sky) = picture(&embedded(&png(2), &png(64), |json| json["materials"] = json!([{}, {}])));
+    for (field, material) in factors_of_nothing() {
+        let beside = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}});
+        let bytes = embedded(&png(2), &png(64), |json| {
+            json["materials"] = json!([material, beside]);
+            let mut other = json["meshes"][0]["primitives"][0].clone();
+            other["material"] = json!(0);
+            json["meshes"][0]["primitives"].as_array_mut().unwrap().push(other);
+        });
+        assert_eq!(picture(&bytes).1 - sky, 64 * 64 * 3, "{field}");
+    }
+    let rough = json!({"pbrMetallicRoughness": {
+        "metallicFactor": 0.0, "roughnessFactor": 0.5, "metallicRoughnessTexture": {"index": 1}
+    }});
+    let bytes = embedded(&png(2), &png(64), |json| json["materials"] = json!([{}, rough]));
+    assert_eq!(picture(&bytes).1 - sky, 64 * 64 * 3);
 }

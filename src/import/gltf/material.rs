@@ -39,6 +39,8 @@ pub(super) fn read(
     let pbr = &json.pbr_metallic_roughness;
     let [r, g, b, a] = pbr.base_color_factor.0;
     let metallic_roughness = pbr.metallic_roughness_texture.as_ref();
+    let (metallic, roughness) = (pbr.metallic_factor.0, pbr.roughness_factor.0);
+    let emissive = json.emissive_factor.0;
     let mut material = GltfMaterial {
         base_color_factor: reader.color("baseColorFactor", [r, g, b], Limits::Unit)?,
         alpha_factor: reader.number("baseColorFactor's alpha", a, Limits::Unit)?,
@@ -47,22 +49,29 @@ pub(super) fn read(
             Encoding::Srgb,
             "baseColorTexture",
         )?,
-        metallic_factor: reader.number("metallicFactor", pbr.metallic_factor.0, Limits::Unit)?,
-        roughness_factor: reader.number("roughnessFactor", pbr.roughness_factor.0, Limits::Unit)?,
-        metallic_roughness_texture: reader.info(
+        metallic_factor: reader.number("metallicFactor", metallic, Limits::Unit)?,
+        roughness_factor: reader.number("roughnessFactor", roughness, Limits::Unit)?,
+        metallic_roughness_texture: reader.info_times(
+            &[metallic, roughness],
             metallic_roughness,
             Encoding::Linear,
             "metallicRoughnessTexture",
         )?,
         occlusion: json.occlusion_texture.is_some(),
-        emissive_factor: reader.color("emissiveFactor", json.emissive_factor.0, Limits::Unit)?,
-        emissive_texture: reader.info(json.emissive_texture.as_ref(), Encoding::Srgb, "emissiveTexture")?,
+        emissive_factor: reader.color("emissiveFactor", emissive, Limits::Unit)?,
+        emissive_texture: reader.info_times(
+            &emissive,
+            json.emissive_texture.as_ref(),
+            Encoding::Srgb,
+            "emissiveTexture",
+        )?,
         alpha_mode: reader.alpha_mode(json)?,
         double_sided: json.double_sided,
         vertex_color,
         ..GltfMaterial::default()
     };
-    if let Some(normal) = &json.normal_texture {
+    if let Some(normal) = json.normal_texture.as_ref().filter(|normal| reader.textures.want(&[normal.scale]))
+    {
         let slot = Slot::normal(normal)?;
         let element = reader.element("normalTexture");
         material.normal_texture = Some(reader.textures.map(&slot, Encoding::Linear, &element)?);
@@ -131,6 +140,18 @@ impl Reader<'_, '_> {
         info.map(|info| self.textures.map(&info.into(), encoding, &element)).transpose()
     }
 
+    /// As [`Self::info`]; none where all `factors` of its values are 0, if only what is sampled is wanted.
+    fn info_times(
+        &mut self,
+        factors: &[f32],
+        info: Option<&Info>,
+        encoding: Encoding,
+        field: &'static str,
+    ) -> Result<Option<TextureMap>, GltfError> {
+        let wanted = info.filter(|_| self.textures.want(factors));
+        self.info(wanted, encoding, field)
+    }
+
     fn alpha_mode(&self, json: &Material) -> Result<AlphaMode, GltfError> {
         match json.alpha_mode {
             Checked::Valid(JsonAlphaMode::Opaque) => Ok(AlphaMode::Opaque),
@@ -173,13 +194,19 @@ impl Reader<'_, '_> {
                 let (texture, color_texture) = (json.specular_texture, json.specular_color_texture);
                 material.specular = Some(GltfSpecular {
                     factor: self.number("specularFactor", json.specular_factor, Limits::Unit)?,
-                    texture: self.info(texture.as_ref(), Encoding::Linear, "specularTexture")?,
+                    texture: self.info_times(
+                        &[json.specular_factor],
+                        texture.as_ref(),
+                        Encoding::Linear,
+                        "specularTexture",
+                    )?,
                     color: self.color(
                         "specularColorFactor",
                         json.specular_color_factor,
                         Limits::NotNegative,
                     )?,
-                    color_texture: self.info(
+                    color_texture: self.info_times(
+                        &json.specular_color_factor,
                         color_texture.as_ref(),
                         Encoding::Srgb,
                         "specularColorTexture",
@@ -190,7 +217,8 @@ impl Reader<'_, '_> {
                 let json: Clearcoat = parse(json)?;
                 material.clearcoat = Some(GltfClearcoat {
                     factor: self.number("clearcoatFactor", json.clearcoat_factor, Limits::Unit)?,
-                    texture: self.info(
+                    texture: self.info_times(
+                        &[json.clearcoat_factor],
                         json.clearcoat_texture.as_ref(),
                         Encoding::Linear,
                         "clearcoatTexture",
@@ -200,7 +228,8 @@ impl Reader<'_, '_> {
                         json.clearcoat_roughness_factor,
                         Limits::Unit,
                     )?,
-                    roughness_texture: self.info(
+                    roughness_texture: self.info_times(
+                        &[json.clearcoat_roughness_factor],
                         json.clearcoat_roughness_texture.as_ref(),
                         Encoding::Linear,
                         "clearcoatRoughnessTexture",
@@ -214,7 +243,8 @@ impl Reader<'_, '_> {
                 let json: Sheen = parse(json)?;
                 material.sheen = Some(GltfSheen {
                     color: self.color("sheenColorFactor", json.sheen_color_factor, Limits::Unit)?,
-                    color_texture: self.info(
+                    color_texture: self.info_times(
+                        &json.sheen_color_factor,
                         json.sheen_color_texture.as_ref(),
                         Encoding::Srgb,
                         "sheenColorTexture",
@@ -232,7 +262,8 @@ impl Reader<'_, '_> {
                 material.anisotropy = Some(GltfAnisotropy {
                     strength: self.number("anisotropyStrength", json.anisotropy_strength, Limits::Unit)?,
                     rotation: self.number("anisotropyRotation", json.anisotropy_rotation, Limits::Finite)?,
-                    texture: self.info(
+                    texture: self.info_times(
+                        &[json.anisotropy_strength],
                         json.anisotropy_texture.as_ref(),
                         Encoding::Linear,
                         "anisotropyTexture",
@@ -243,7 +274,8 @@ impl Reader<'_, '_> {
                 let json: Transmission = parse(json)?;
                 material.transmission = Some(GltfTransmission {
                     factor: self.number("transmissionFactor", json.transmission_factor, Limits::Unit)?,
-                    texture: self.info(
+                    texture: self.info_times(
+                        &[json.transmission_factor],
                         json.transmission_texture.as_ref(),
                         Encoding::Linear,
                         "transmissionTexture",
@@ -272,13 +304,15 @@ impl Reader<'_, '_> {
                 let color = json.diffuse_transmission_color_factor;
                 material.diffuse_transmission = Some(GltfDiffuseTransmission {
                     factor: self.number("diffuseTransmissionFactor", factor, Limits::Unit)?,
-                    texture: self.info(
+                    texture: self.info_times(
+                        &[factor],
                         json.diffuse_transmission_texture.as_ref(),
                         Encoding::Linear,
                         "diffuseTransmissionTexture",
                     )?,
                     color: self.color("diffuseTransmissionColorFactor", color, Limits::Unit)?,
-                    color_texture: self.info(
+                    color_texture: self.info_times(
+                        &color,
                         json.diffuse_transmission_color_texture.as_ref(),
                         Encoding::Srgb,
                         "diffuseTransmissionColorTexture",

@@ -75,7 +75,7 @@ pub(super) fn import(
     let variant = Variant::choose(root, options.variant.as_deref())?;
 
     let mut scene = Scene::empty();
-    let mut textures = Textures::new(root, &buffers, files);
+    let mut textures = Textures::new(root, &buffers, files, options.images);
     let shown = match options.images {
         DecodedImages::OfMaterials => (0..root.materials.len()).collect(),
         DecodedImages::OfInstances => shown_materials(root, variant, &placed)?,

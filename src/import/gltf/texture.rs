@@ -14,7 +14,7 @@ use serde::Deserialize;
 use super::buffers::{Buffers, lookup, read_file, resolve};
 use super::error::GltfError;
 use super::uri::Target;
-use crate::import::{Files, Images};
+use crate::import::{DecodedImages, Files, Images};
 use crate::math::Real;
 use crate::record::Warning;
 use crate::scene::material::{TextureChannel, TextureMap};
@@ -65,6 +65,8 @@ pub(super) struct Textures<'a> {
     by_view: BTreeMap<usize, ImageId>,
     by_use: BTreeMap<(usize, bool), TextureId>,
     decoder: Images,
+    /// Textures are wanted whether or not they change what is seen.
+    wants_all: bool,
     /// Whether what is asked for is sampled.
     decodes: bool,
     warnings: Vec<Warning>,
@@ -72,7 +74,12 @@ pub(super) struct Textures<'a> {
 
 impl<'a> Textures<'a> {
     /// The textures of `root`, none of them made yet.
-    pub(super) fn new(root: &'a Root, buffers: &'a Buffers<'a>, files: &'a mut Files) -> Self {
+    pub(super) fn new(
+        root: &'a Root,
+        buffers: &'a Buffers<'a>,
+        files: &'a mut Files,
+        wanted: DecodedImages,
+    ) -> Self {
         Self {
             root,
             buffers,
@@ -84,6 +91,7 @@ impl<'a> Textures<'a> {
             by_view: BTreeMap::new(),
             by_use: BTreeMap::new(),
             decoder: Images::default(),
+            wants_all: wanted == DecodedImages::OfMaterials,
             decodes: true,
             warnings: Vec::new(),
         }
@@ -97,6 +105,11 @@ impl<'a> Textures<'a> {
     /// From here on textures are for what nothing samples: images that aren't decoded yet stay so.
     pub(super) fn decode_no_more(&mut self) {
         self.decodes = false;
+    }
+
+    /// Whether a texture whose values are multiplied by these is wanted.
+    pub(super) fn want(&self, factors: &[f32]) -> bool {
+        self.wants_all || factors.iter().any(|&factor| factor != 0.0)
     }
 
     /// The texture of `slot`, whose values mean `encoding`, as `element` uses it.
