@@ -194,3 +194,94 @@ fn failure(error: &JobError) -> Outcome {
 fn bug() -> Outcome {
     Outcome::Failed { error: "a bug in this program: the job panicked; the message is on stderr".to_owned() }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::color::Rgb;
+    use crate::convert::ConvertOptions;
+    use crate::import::ImportOptions;
+    use crate::job::{finished, load, plan};
+    use crate::record::{Job, Override, Value};
+    use crate::scene::material::{Param, TextureChannel, TextureMap};
+    use crate::scene::texture::{Encoding, Pixels, TexelFilter, Wrap};
+    use crate::scene::{Image, ImageId, Texture, TextureId};
+    use crate::settings::{RenderSettings, Use};
+
+    /// A job in which nothing is traced before it is rendered.
+    fn job(scene: &Path, roughness: f64) -> Job {
+        let settings = RenderSettings {
+            width: Some(24),
+            height: Some(18),
+            spp: 4,
+            light_paths: Use::Never,
+            path_reuse: Use::Never,
+            splitting: Use::Never,
+            adaptive: Use::Never,
+            ..RenderSettings::default()
+        };
+        Job {
+            name: format!("roughness={roughness}"),
+            scene: scene.to_owned(),
+            overrides: vec![Override {
+                path: "material.paint.roughness".into(),
+                value: Value::Number(roughness),
+            }],
+            settings,
+            coordinates: Vec::new(),
+        }
+    }
+
+    /// No file that is read becomes an image without pixels: the mistake is planted behind all checks, where only a panic can tell it.
+    #[test]
+    fn a_job_that_panics_leaves_the_others_of_its_group_as_they_are_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("square.obj");
+        std::fs::write(folder.path().join("square.mtl"), "newmtl paint\nKd 0.5 0.4 0.3\n").unwrap();
+        let square = "mtllib square.mtl\nusemtl paint\nv -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 1 4 3 2\n";
+        std::fs::write(&scene, square).unwrap();
+        let loaded = load(&scene, &ImportOptions::default(), &ConvertOptions::default(), None).unwrap();
+        let build = Build::current().unwrap();
+        let pixels = Pixels::U8(Vec::new());
+        let hollow = Arc::new(Image { name: "hollow".into(), width: 2, height: 2, channels: 3, pixels });
+        let into = |name: &str| Destination { folder: folder.path().join(name), references: None };
+        let ready = |roughness: f64, is_broken: bool, destination: &Destination| {
+            std::fs::create_dir_all(&destination.folder).unwrap();
+            let mut planned = plan(&job(&scene, roughness), &loaded, &build).unwrap();
+            let world = Arc::make_mut(&mut planned.scene);
+            let texture = TextureId(world.textures.len() as u32);
+            let (image, encoding) = (ImageId(world.images.len() as u32), Encoding::Linear);
+            let (wrap, filter) = ([Wrap::Repeat; 2], TexelFilter::Bilinear);
+            world.textures.push(Texture { image, encoding, wrap, filter });
+            world.images.push(Arc::clone(&hollow));
+            if is_broken {
+                let map = TextureMap::new(texture, TextureChannel::R);
+                world.materials[0].item.base_color = Param::Texture { map, factor: Rgb::WHITE };
+            }
+            prepare(planned, &loaded, &build, destination).unwrap()
+        };
+        let control = Control::default();
+        let (together, alone) = (into("together"), into("alone"));
+        let jobs = [(0.2, false), (0.4, true), (0.6, false)];
+        let group = jobs.map(|(roughness, is_broken)| ready(roughness, is_broken, &together));
+        assert!(group[2].joins(&[&group[0], &group[1]]), "or they would be rendered one by one");
+        let records = run_together(&group.each_ref(), &build, &together, &control).unwrap();
+        for ((roughness, is_broken), record) in jobs.into_iter().zip(&records) {
+            let name = &record.job.name;
+            if is_broken {
+                assert_eq!(record.outcome, bug());
+                assert!(!image_path(&together.folder, name).exists());
+                continue;
+            }
+            assert_eq!(record.outcome, Outcome::Done, "{name}");
+            run_together(&[&ready(roughness, false, &alone)], &build, &alone, &control).unwrap();
+            let bytes = |at: &Destination| std::fs::read(image_path(&at.folder, name)).unwrap();
+            assert!(bytes(&together) == bytes(&alone), "{name}");
+        }
+        assert!(group.iter().zip(&records).all(|(ready, record)| {
+            finished(&ready.planned, &together.folder).is_some() == (record.outcome == Outcome::Done)
+        }));
+    }
+}
