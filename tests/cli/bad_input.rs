@@ -47,6 +47,7 @@ fn shining(uri: &str) -> Vec<u8> {
     triangle(|json| {
         json["images"] = json!([{"uri": uri}]);
         json["textures"] = json!([{"source": 0}]);
+        json["materials"][0]["emissiveFactor"] = json!([1, 1, 1]);
         json["materials"][0]["emissiveTexture"] = json!({"index": 0});
     })
 }
@@ -122,8 +123,11 @@ fn gltf_that_asks_for_the_same_again_and_again() {
     let images = many(|j| {
         j["images"] = json!(vec![json!({"uri": "t.png"}); 100]);
         j["textures"] = json!((0..100).map(|i| json!({"source": i})).collect::<Vec<_>>());
-        j["materials"] =
-            json!((0..100).map(|i| json!({"emissiveTexture": {"index": i}})).collect::<Vec<_>>());
+        j["materials"] = json!(
+            (0..100)
+                .map(|i| json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": i}}))
+                .collect::<Vec<_>>()
+        );
     });
     let side = 3000;
     let png = pipeline::imagefile::encode_png(side, side, &vec![0; (side * side * 3) as usize]).unwrap();
