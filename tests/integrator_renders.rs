@@ -120,6 +120,24 @@ fn a_point_light_gives_its_formula_and_shadows() {
     assert_eq!(mean(&render_scene(&scene(parts, camera), &point(2.0))), 0.0);
 }
 
+/// So far away that the geometry counts from an origin of its own.
+#[test]
+fn depths_and_point_lights_are_the_same_far_from_the_origin() {
+    let far = Vec3::new(4096.0, -8192.0, 2048.0);
+    let moved = |by: Vec3| {
+        let mut sheet = square(1.0, 0.0);
+        sheet.positions.iter_mut().for_each(|p| *p += by);
+        let camera = Camera::look_at(by + Vec3::Y * 2.0, by, Vec3::Z, 0.4);
+        scene(vec![(sheet, lambert(0.5))], camera)
+    };
+    let point = |by: Vec3| Integrator::Point { position: (by + Vec3::Y).to_array(), energy: [10.0; 3] };
+    for (near, distant) in [(Integrator::Depths, Integrator::Depths), (point(Vec3::ZERO), point(far))] {
+        let [near, distant] = [(Vec3::ZERO, near), (far, distant)]
+            .map(|(by, integrator)| mean(&render_scene(&moved(by), &with(integrator, small(8, 8, 4, 4)))));
+        assert!(near > 0.1 && (distant / near - 1.0).abs() < 1e-3, "{near} {distant}");
+    }
+}
+
 #[test]
 fn whitted_is_direct_light_seen_directly_or_in_mirrors() {
     let whitted = |spp| with(Integrator::Whitted, small(8, 8, spp, 1023));

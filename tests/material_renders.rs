@@ -8,12 +8,13 @@ use std::sync::Arc;
 use common::{lambert, largest_error, mean, render_scene, scene, small, square};
 use glam::{Vec2, Vec3};
 use pipeline::color::Rgb;
-use pipeline::disney::Parameter;
+use pipeline::disney::{Model, Parameter};
 use pipeline::scene::environment::Environment;
 use pipeline::scene::light::{Light, LightKind};
 use pipeline::scene::material::{Curve, Emission, Material, Param, Sides, TextureChannel, TextureMap};
 use pipeline::scene::texture::{Encoding, Pixels, TexelFilter, Texture, Wrap};
 use pipeline::scene::{AnisotropyMap, Camera, Image, ImageId, Mesh, Named, Scene, TextureId};
+use pipeline::settings::{Integrator, RenderSettings};
 
 fn looking_down(from: f32) -> Camera {
     Camera::look_at(Vec3::new(0.0, from, 0.0), Vec3::ZERO, Vec3::Z, 0.2)
@@ -44,6 +45,26 @@ fn an_unlit_surface_lights_nothing_and_hides_what_is_behind_it() {
     lit.environment = Some(Environment::constant(Rgb::WHITE));
     let dim = mean(&render_scene(&lit, &small(8, 8, 64, 8)));
     assert!(dim > 0.05 && dim < 0.6, "{dim}");
+}
+
+/// The camera sees it in a mirror, but what the mirror throws on other surfaces is light, of which it has none.
+#[test]
+fn an_unlit_surface_is_seen_in_mirrors_and_lights_nothing_by_way_of_them() {
+    let mirror = || Material { model: Model::Mirror, ..Material::default() };
+    let unlit = || unlit(Rgb::grey(0.5));
+    // A square under a ceiling, above a wider floor.
+    let seen = |[below, ceiling, floor]: [Material; 3], integrator: Integrator| {
+        let parts =
+            vec![(square(1.0, 0.0), below), (square(20.0, 2.0), ceiling), (square(20.0, -1.0), floor)];
+        let settings = RenderSettings { integrator, ..small(8, 8, 64, 8) };
+        render_scene(&scene(parts, looking_down(1.5)), &settings)
+    };
+    for integrator in [Integrator::Path, Integrator::Whitted] {
+        let mirrored = seen([mirror(), unlit(), lambert(0.5)], integrator);
+        assert!(largest_error(&mirrored, 0.5) < 1e-5, "{integrator:?}");
+        let lit = seen([lambert(0.9), mirror(), unlit()], integrator);
+        assert_eq!(mean(&lit), 0.0, "{integrator:?}");
+    }
 }
 
 #[test]

@@ -13,7 +13,6 @@ pub(super) struct FilmCamera {
     world_from_camera: Affine3A,
     /// Unit viewing axis in the world: depth is measured along it.
     pub(super) axis: Vec3,
-    origin: Vec3,
     camera_from_world: Mat3,
     /// The gradient in the world of the camera's z: a row of `camera_from_world`.
     depth_gradient: Vec3,
@@ -65,7 +64,6 @@ impl FilmCamera {
         Ok(Self {
             world_from_camera,
             axis: Vec3::from(-matrix.z_axis).normalize(),
-            origin: camera.world_from_camera.translation.into(),
             camera_from_world: matrix.inverse().into(),
             depth_gradient: matrix.inverse().row(2).into(),
             per_area: 1.0 / (matrix.determinant().abs() * per_pixel * per_pixel),
@@ -84,7 +82,7 @@ impl FilmCamera {
 
     /// How far `point` lies in front along the camera's own -z, in units of its matrix: the parameter t of the ray (x/f, y/f, -1).
     pub(super) fn depth_of(&self, point: Vec3) -> f32 {
-        (self.origin - point).dot(self.depth_gradient)
+        (Vec3::from(self.world_from_camera.translation) - point).dot(self.depth_gradient)
     }
 
     /// The ray of a film position in pixels from the top left corner; its direction has unit length.

@@ -45,7 +45,7 @@ pub(super) fn integrate(
             at_first(scene, sampler, &ray, inspect, |s, rays| ambient_occlusion(scene, sampler, s, rays))
         }
         Integrator::Point { position, energy } => at_first(scene, sampler, &ray, inspect, |s, rays| {
-            point_light(scene, s, position.into(), energy.into(), rays)
+            point_light(scene, s, Vec3::from(position) - scene.geometry.origin(), energy.into(), rays)
         }),
         Integrator::EmitterCheck => {
             at_first(scene, sampler, &ray, &mut inspect, |s, rays| emitter_check(scene, sampler, s, rays))
@@ -66,7 +66,8 @@ fn at_first(
         let surface = Surface::new(scene, ray, &hit);
         path.first = Some(first_hit(scene, ray, &surface, surface.shading(scene, &mut None).as_ref()));
         path.radiance = value(&surface, &mut path.rays);
-        inspect(ReplayVertex { point: surface.point.into(), radiance: path.radiance, beta: Rgb::WHITE });
+        let point = surface.in_world(scene).into();
+        inspect(ReplayVertex { point, radiance: path.radiance, beta: Rgb::WHITE });
     }
     path
 }
@@ -156,16 +157,13 @@ fn whitted(
         let surface = Surface::new(scene, &ray, &hit);
         medium = surface.medium_before(medium);
         beta *= super::medium::transmittance(medium, hit.t);
-        path.radiance += beta * surface.emitted(scene);
-        if vertex == 1 {
-            path.radiance += beta * surface.unlit(scene);
-        }
+        path.radiance += beta * (surface.emitted(scene) + surface.unlit(scene));
         let mut varying = None;
         let shading = surface.shading(scene, &mut varying);
         if path.first.is_none() {
             path.first = Some(first_hit(scene, &camera_ray, &surface, shading.as_ref()));
         }
-        inspect(ReplayVertex { point: surface.point.into(), radiance: path.radiance, beta });
+        inspect(ReplayVertex { point: surface.in_world(scene).into(), radiance: path.radiance, beta });
         let Some(shading) = shading else { break };
         if vertex > scene.settings.max_depth {
             break;

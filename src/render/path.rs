@@ -92,6 +92,8 @@ pub(super) struct Walk {
     /// Radiance grows by eta² on entering glass and shrinks again on leaving: roulette must not see that.
     eta_scale: f32,
     scatterings: u32,
+    /// The camera sees where it is, maybe in mirrors and through glass.
+    is_direct_view: bool,
     medium: Medium,
     from_light: FromLight,
 }
@@ -128,6 +130,7 @@ impl Walk {
             last_scatter: None,
             eta_scale: 1.0,
             scatterings: 0,
+            is_direct_view: true,
             medium: scene.camera_medium,
             from_light: FromLight::CAMERA,
         }
@@ -282,7 +285,7 @@ impl Walk {
             self.path.first = Some(first_hit(scene, &self.camera_ray, &surface, shading.as_ref()));
         }
         inspect(ReplayVertex {
-            point: (surface.point + scene.geometry.origin()).into(),
+            point: surface.in_world(scene).into(),
             radiance: self.before.map_or(self.path.radiance, |b| b.radiance + b.beta * self.path.radiance),
             beta: self.before.map_or(self.beta, |b| b.beta * self.beta),
         });
@@ -372,7 +375,7 @@ impl Walk {
             let emission = || scene.lights.pdf_emission(triangle);
             self.add_met(scene, emitted, Heuristic::Power, pdf_light, emission);
         }
-        if self.last_scatter.is_none() {
+        if self.is_direct_view {
             self.path.radiance += self.beta * surface.unlit(scene);
         }
     }
@@ -416,6 +419,7 @@ impl Walk {
         }
         self.eta_scale *= sample.eta * sample.eta;
         self.scatterings += 1;
+        self.is_direct_view &= sample.lobe.is_delta();
         self.last_scatter = (!sample.lobe.is_delta()).then_some(LastScatter { receiver, pdf: sample.pdf });
         match self.last_scatter {
             None => self.from_light.mirror(scene, surface, shading, wi),

@@ -80,13 +80,19 @@ impl<'a> Surface<'a> {
         w.dot(self.normal).abs()
     }
 
+    /// Where it is in the world: `point` is relative to the geometry's origin.
+    #[inline]
+    pub(super) fn in_world(&self, scene: &Prepared) -> Vec3 {
+        self.point + scene.geometry.origin()
+    }
+
     /// The radiance that leaves towards the viewer.
     #[inline]
     pub(super) fn emitted(&self, scene: &Prepared) -> Rgb {
         self.material.emitted(&scene.scene, &self.at, self.is_front)
     }
 
-    /// What the camera alone sees of it.
+    /// What the camera alone sees of it, maybe in mirrors and through glass.
     #[inline]
     pub(super) fn unlit(&self, scene: &Prepared) -> Rgb {
         self.material.unlit(&scene.scene, &self.at, self.is_front)
