@@ -57,7 +57,7 @@ pub struct RenderSettings {
     #[serde(skip_serializing_if = "is_default")]
     pub light_paths: Use,
     /// Let neighbouring pixels use each other's paths from their second surfaces on: far less noise of indirect light, which is alike in blocks
-    /// of two by two pixels then, or of four by two where neighbours see alike.
+    /// of four by two pixels then, of four by four where neighbours see alike, or of two by two where noisy parts get more samples.
     #[serde(skip_serializing_if = "is_default")]
     pub path_reuse: Use,
     /// Let two paths go on from the first surface of each sample, instead of one: less noise of what surfaces reflect for less than twice the

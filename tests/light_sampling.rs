@@ -6,10 +6,12 @@ use std::sync::Arc;
 
 use common::{emitting, lambert, metal, render_scene, scene, set_sky, small, sphere, square};
 use glam::Vec3;
+use pipeline::color::Rgb;
 use pipeline::math::hash::{combine, unit_f32};
-use pipeline::render::{Control, Geometry, Prepared, Rendered, Techniques, render};
+use pipeline::render::{Control, Geometry, Prepared, RenderError, Rendered, Techniques, render};
+use pipeline::scene::light::{Light, LightKind};
 use pipeline::scene::material::{Param, Sides};
-use pipeline::scene::{Camera, Material, Mesh, Scene};
+use pipeline::scene::{Camera, Material, Mesh, Named, Scene};
 use pipeline::settings::{RenderSettings, Use};
 
 fn random(i: u32, salt: u64) -> f32 {
@@ -116,6 +118,41 @@ fn assert_same(what: &str, (a, variance_a): (f64, f64), (b, variance_b): (f64, f
     assert!(sigma < 0.02 * b, "{what}: {b} ± {sigma}");
 }
 
+fn over_a_floor(lights: Vec<Light>) -> Scene {
+    let camera = Camera::look_at(Vec3::new(0.0, 3.0, 0.0), Vec3::ZERO, Vec3::Z, 0.8);
+    let mut world = scene(vec![(square(3.0, 0.0), lambert(0.5))], camera);
+    world.lights = lights.into_iter().map(|light| Named::new("lamp", light)).collect();
+    world
+}
+
+/// Among several lights the tree bounds where each shines: what a cone of nothing but full light bounds is found too.
+#[test]
+fn a_spot_with_a_hard_edge_is_chosen_among_others() {
+    let spot = |inner: f32| {
+        let (position, direction) = (Vec3::Y * 2.0, -Vec3::Y);
+        let kind = LightKind::Spot { position, direction, inner, outer: 0.3, range: None };
+        Light { kind, color: Rgb::WHITE, intensity: 10.0 }
+    };
+    let kind = LightKind::Point { position: Vec3::new(2.0, 1.0, 0.0), range: None };
+    let dim = Light { kind, color: Rgb::WHITE, intensity: 1e-6 };
+    for inner in [0.3, 0.299_99, 0.2999, 0.2] {
+        let found = |lights: Vec<Light>| {
+            mean_and_variance(&render_scene(&over_a_floor(lights), &small(32, 32, 64, 2))).0
+        };
+        let (alone, among_others) = (found(vec![spot(inner)]), found(vec![spot(inner), dim]));
+        assert!(alone > 0.01 && (among_others / alone - 1.0).abs() < 0.01, "{inner}: {alone} {among_others}");
+    }
+}
+
+#[test]
+fn a_light_beyond_what_a_float_holds_is_an_error() {
+    let kind = LightKind::Directional { direction: -Vec3::Y };
+    let world = over_a_floor(vec![Light { kind, color: Rgb::grey(1e20), intensity: 1e20 }]);
+    let geometry = Arc::new(Geometry::build(&world).expect("geometry"));
+    let error = Prepared::new(Arc::new(world), geometry, &small(4, 4, 1, 1)).expect_err("too much");
+    assert!(matches!(&error, RenderError::LightEmission { light } if light == "lamp"), "{error}");
+}
+
 #[test]
 fn short_renders_have_the_mean_of_long_ones() {
     for (what, world) in
@@ -137,7 +174,7 @@ fn lights_chosen_by_what_is_mirrored_are_the_same_with_less_noise() {
         let prepared =
             Prepared::new(Arc::new(world.clone()), Arc::clone(&geometry), settings).expect("prepared");
         let prepared = prepared.with(Techniques { lights_by_gloss, ..Techniques::default() });
-        mean_and_variance(&render(&prepared, &Control::default()).expect("a picture"))
+        mean_and_variance(&render(&prepared, &Control::default()))
     };
     let settings = RenderSettings {
         light_paths: Use::Never,

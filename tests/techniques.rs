@@ -47,7 +47,7 @@ fn prepared(scene: &LoadedScene, spp: u32) -> Prepared {
 }
 
 fn rendered(scene: &Prepared) -> Rendered {
-    render(scene, &Control::default()).expect("a picture")
+    render(scene, &Control::default())
 }
 
 /// Every value of every layer.

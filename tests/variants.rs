@@ -3,6 +3,7 @@
 mod common;
 
 use std::sync::{Arc, LazyLock};
+use std::time::Duration;
 
 use common::{disney, emitting, glass, lambert, metal, scene, set_sky, sphere, square};
 use glam::Vec3;
@@ -91,14 +92,18 @@ fn looks() -> Vec<Scene> {
 }
 
 fn together(scenes: &[Prepared]) -> Vec<Rendered> {
+    together_within(None, scenes)
+}
+
+fn together_within(time_limit: Option<Duration>, scenes: &[Prepared]) -> Vec<Rendered> {
     let variants = Variants::leading(scenes).expect("a scene");
     assert_eq!(variants.scenes().len(), scenes.len());
     let mut found = Vec::new();
-    render_together(&variants, &Control::default(), |index, rendered| {
+    let control = Control { time_limit, ..Control::default() };
+    render_together(&variants, &control, |index, rendered| {
         assert_eq!(index, found.len());
         found.push(rendered);
-    })
-    .expect("rendered");
+    });
     found
 }
 
@@ -110,7 +115,7 @@ fn bits(rendered: &Rendered) -> (Vec<u32>, &Counts) {
 #[track_caller]
 fn assert_the_same(scenes: &[Prepared]) {
     for (index, (together, scene)) in together(scenes).iter().zip(scenes).enumerate() {
-        let alone = render(scene, &Control::default()).expect("rendered");
+        let alone = render(scene, &Control::default());
         assert!(bits(together) == bits(&alone), "look {index}");
         let shared = together.shared_rays as f64 / together.counts.rays as f64;
         assert!((0.3..0.95).contains(&shared), "look {index}: {shared}");
@@ -179,6 +184,21 @@ fn variants_that_plan_their_samples_have_the_bits_that_each_has_alone() {
         let paths: Vec<u64> = together(&scenes).iter().map(|rendered| rendered.counts.paths).collect();
         assert!(paths.iter().any(|&count| count != paths[0]), "they have different plans: {paths:?}");
     }
+}
+
+/// Before a limit of time plans follow each other, between which variants stand at different numbers of samples.
+#[test]
+fn variants_that_plan_several_times_have_the_bits_that_each_has_alone() {
+    let settings = RenderSettings { adaptive: Use::Always, spp: 128, ..settings(Use::Never) };
+    let scenes = prepared(&looks()[..3], &[settings]);
+    let hour = Duration::from_secs(3600);
+    let found = together_within(Some(hour), &scenes);
+    for (scene, together) in scenes.iter().zip(&found) {
+        let alone = render(scene, &Control { time_limit: Some(hour), ..Control::default() });
+        assert!(bits(together) == bits(&alone));
+    }
+    let paths: Vec<u64> = found.iter().map(|rendered| rendered.counts.paths).collect();
+    assert!(paths.iter().any(|&count| count != paths[0]), "they have different plans: {paths:?}");
 }
 
 #[test]

@@ -147,7 +147,7 @@ fn picture(imported: Imported, materials: Option<&Path>) -> Result<(), JobError>
     };
     let geometry = Arc::new(Geometry::build(&scene)?);
     let prepared = Prepared::new(Arc::new(scene), geometry, &settings)?;
-    render(&prepared, &Control::default())?;
+    render(&prepared, &Control::default());
     Ok(())
 }
 

@@ -123,7 +123,7 @@ pub fn measure(subject: &Subject<'_>, plan: &Plan, watch: &mut Watch<'_>) -> Res
         for &samples in &plan.levels {
             let prepared = subject.prepared(subject.planned(samples, seed)?, &subject.loaded.geometry)?;
             let what = format!("{name}: {samples} samples, seed {seed}");
-            let (Rendered { raster, counts, .. }, seconds) = timed(&prepared, &what, watch)?;
+            let (Rendered { raster, counts, .. }, seconds) = timed(&prepared, &what, watch);
             let deviation = error::deviation(raster.picture(), reference.picture());
             runs.push(Run { samples, seed, seconds, rays: counts.rays, deviation });
         }
@@ -134,10 +134,10 @@ pub fn measure(subject: &Subject<'_>, plan: &Plan, watch: &mut Watch<'_>) -> Res
 }
 
 /// A render, and the wall-clock seconds it took.
-fn timed(scene: &Prepared, what: &str, watch: &mut Watch<'_>) -> Result<(Rendered, f64), BenchError> {
+fn timed(scene: &Prepared, what: &str, watch: &mut Watch<'_>) -> (Rendered, f64) {
     let control = Arc::new(Control::default());
     watch(what, &control);
     let start = Instant::now();
-    let rendered = render(scene, &control)?;
-    Ok((rendered, start.elapsed().as_secs_f64()))
+    let rendered = render(scene, &control);
+    (rendered, start.elapsed().as_secs_f64())
 }

@@ -7,7 +7,7 @@ use crate::imagefile::{self, write_exr};
 use crate::job::{self, Build, JobError, LoadedScene, PlannedJob};
 use crate::raster::Raster;
 use crate::record::Job;
-use crate::render::{Control, Geometry, Prepared, RenderError};
+use crate::render::{Control, Geometry, Prepared, RenderError, image_size};
 
 /// Added to a job's seed for its reference.
 const REFERENCE_SEED: u64 = 1 << 40;
@@ -57,8 +57,7 @@ impl Subject<'_> {
     pub(super) fn reference(&self, plan: &Plan, watch: &mut Watch<'_>) -> Result<Raster, BenchError> {
         let planned = self.planned(plan.reference, self.job.settings.seed + REFERENCE_SEED)?;
         let path = plan.folder.join(format!("reference-{}.exr", &planned.key[..16]));
-        let prepared = self.prepared(planned, &self.loaded.geometry)?;
-        let (width, height) = prepared.size();
+        let (width, height) = image_size(&planned.scene, &planned.settings)?;
         if path.is_file() {
             let kept = imagefile::read(&path)?;
             let window = kept.picture().window;
@@ -67,8 +66,9 @@ impl Subject<'_> {
             }
             return Err(BenchError::Reference { path, size: format!("{width} × {height}") });
         }
+        let prepared = self.prepared(planned, &self.loaded.geometry)?;
         let what = format!("{}: reference of {} samples", self.job.name, plan.reference);
-        let (rendered, _) = timed(&prepared, &what, watch)?;
+        let (rendered, _) = timed(&prepared, &what, watch);
         let in_folder = |cause| BenchError::Folder { path: plan.folder.clone(), cause };
         std::fs::create_dir_all(&plan.folder).map_err(in_folder)?;
         write_exr(&path, &rendered.raster)?;

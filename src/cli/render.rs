@@ -17,7 +17,7 @@ use crate::manifest::edit;
 use crate::output::{stamp, tone};
 use crate::raster::Raster;
 use crate::record::{Job, Override, Value};
-use crate::render::{Control, Prepared, RenderError, render, replay};
+use crate::render::{Control, Prepared, render, replay};
 use crate::settings::{Display, Filter, RenderSettings, ToneCurve};
 
 /// Render a scene: glTF, OBJ, an Aris YAML scene, or a config root of Aris.
@@ -168,7 +168,7 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
         }
         _ => None,
     };
-    let mut rendered = render_with_progress(&prepared, &planned, arguments.time_limit, talk)?;
+    let mut rendered = render_with_progress(&prepared, &planned, arguments.time_limit, talk);
     stamp(&mut rendered, &planned.provenance(&build, arguments.time_limit));
     if let Some(config) = &config {
         config_root::stamp_config(&mut rendered, config);
@@ -234,12 +234,12 @@ fn render_with_progress(
     planned: &PlannedJob,
     time_limit: Option<Duration>,
     talk: Talk,
-) -> Result<Raster, RenderError> {
+) -> Raster {
     let start = Instant::now();
     let control = Arc::new(Control { time_limit, ..Control::default() });
     let mut progress = Progress::new(1, talk);
     progress.follow(&[&planned.job.name], &control);
-    let rendered = render(prepared, &control)?;
+    let rendered = render(prepared, &control);
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
     let (width, height) = prepared.size();
@@ -256,13 +256,15 @@ fn render_with_progress(
     if !skipped.is_empty() {
         talk.say(&format!("without work for what the scene lacks ({})", skipped.join("; ")));
     }
-    if let Some(bad) = counts.first_bad_samples.first() {
-        talk.say(&format!(
-            "warning: {} samples were not finite or negative and were dropped; the first: --pixel {},{} --sample {}",
-            counts.bad_samples, bad.x, bad.y, bad.sample
-        ));
+    if counts.bad_samples > 0 {
+        let which = counts.first_bad_samples.first().map_or_else(
+            || "all of paths from lights".to_owned(),
+            |bad| format!("the first: --pixel {},{} --sample {}", bad.x, bad.y, bad.sample),
+        );
+        let count = counts.bad_samples;
+        talk.say(&format!("warning: {count} samples were not finite or negative and were dropped; {which}"));
     }
-    Ok(rendered.raster)
+    rendered.raster
 }
 
 /// Whether a file can be made where `path` is to be.

@@ -41,7 +41,7 @@ pub(super) fn lit_sphere(
     let geometry = Arc::new(Geometry::build(&scene)?);
     let settings = RenderSettings { width: Some(size), height: Some(size), spp, ..RenderSettings::default() };
     let prepared = Prepared::new(scene, geometry, &settings)?;
-    let Raster { layers, .. } = render(&prepared, control)?.raster;
+    let Raster { layers, .. } = render(&prepared, control).raster;
     let display = Display { exposure: EXPOSURE, ..Display::default() };
     let rgb = layers[0].rgb().map(|planes| tone::to_srgb8(planes, &display)).unwrap_or_default();
     Ok(Picture { width: size, height: size, rgb })

@@ -14,9 +14,9 @@ pub use identity::Build;
 pub use load::{LoadedRun, LoadedScene, load, load_configured};
 pub use run::{
     Destination, PlannedJob, References, failed_record, finished, image_path, plan, recheck, record_path,
-    recorded, reference_of,
+    recorded, reference_of, write_record,
 };
-pub use together::{Ready, keep_record, prepare, run, run_together};
+pub use together::{Ready, prepare, run, run_together};
 
 /// Why a job can't be done.
 #[derive(Debug, thiserror::Error)]
@@ -71,5 +71,10 @@ impl JobError {
             Self::Library(error) => error.hint(),
             _ => None,
         }
+    }
+
+    /// The message with its hint, in one line.
+    pub fn told(&self) -> String {
+        self.hint().map_or_else(|| self.to_string(), |hint| format!("{self}; hint: {hint}"))
     }
 }

@@ -280,7 +280,10 @@ fn read_record(path: &Path) -> Result<JobRecord, JobError> {
 }
 
 /// Writes a record to its place.
-pub(super) fn write_record(record: &JobRecord, folder: &Path) -> Result<(), JobError> {
+///
+/// # Errors
+/// If it can't be written.
+pub fn write_record(record: &JobRecord, folder: &Path) -> Result<(), JobError> {
     let path = record_path(folder, &record.job.name);
     let mut text = serde_json::to_vec_pretty(record).expect("plain data has a JSON form");
     text.push(b'\n');

@@ -68,14 +68,6 @@ impl Ready {
     }
 }
 
-/// Writes the record of a job that could not be prepared.
-///
-/// # Errors
-/// If it can't be written.
-pub fn keep_record(record: &JobRecord, destination: &Destination) -> Result<(), JobError> {
-    write_record(record, &destination.folder)
-}
-
 /// Renders a job, writes its image, compares it, and writes its record last. What fails is told in the record.
 ///
 /// # Errors
@@ -128,24 +120,20 @@ pub fn run_together(
         written = std::mem::replace(&mut written, Ok(())).and(write_record(&record, &destination.folder));
         records[index] = Some(record);
     };
-    // A panic is a bug, but no reason to take other jobs down.
-    let caught = catch_unwind(AssertUnwindSafe(|| render_together(&variants, control, &mut finish)));
+    // A panic is a bug, but no reason to take other jobs down; those that it leaves unfinished have no record yet.
+    let _ = catch_unwind(AssertUnwindSafe(|| render_together(&variants, control, &mut finish)));
     written?;
-    let outcome = match caught {
-        Ok(rendered) => rendered.err().map(|error| failure(&error.into())),
-        Err(_) => Some(bug()),
-    };
     let mut finished = Vec::with_capacity(jobs.len());
     for (record, ready) in records.into_iter().zip(jobs) {
-        finished.push(match (record, &outcome) {
-            (Some(record), _) => record,
-            (None, Some(outcome)) if jobs.len() == 1 => {
-                let record = JobRecord { outcome: outcome.clone(), ..ready.record.clone() };
+        finished.push(match record {
+            Some(record) => record,
+            None if jobs.len() == 1 => {
+                let record = JobRecord { outcome: bug(), ..ready.record.clone() };
                 write_record(&record, &destination.folder)?;
                 record
             }
             // It may be another one's fault.
-            (None, _) => run_together(&[*ready], build, destination, control)?.swap_remove(0),
+            None => run_together(&[*ready], build, destination, control)?.swap_remove(0),
         });
     }
     Ok(finished)
@@ -188,7 +176,7 @@ fn keep(
 }
 
 fn failure(error: &JobError) -> Outcome {
-    Outcome::Failed { error: error.to_string() }
+    Outcome::Failed { error: error.told() }
 }
 
 fn bug() -> Outcome {

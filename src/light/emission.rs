@@ -75,10 +75,10 @@ impl Lights {
     /// direction, the third which light, the fourth to which side; the other two where light from the environment passes.
     #[inline]
     pub fn emit(&self, [u0, u1, u_light, u_side]: [f32; 4], u_disk: [f32; 2]) -> Option<Emission> {
-        let (index, _) = self.emitters.choice.sample(u_light)?;
+        let (index, _, rest) = self.emitters.choice.sample_with_rest(u_light)?;
         if index == self.emitters.environment {
             let environment = self.environment.as_ref()?;
-            let (wi, sky, _) = environment.sample(None, [u0, u1], [u_side, u_side])?;
+            let (wi, sky, _) = environment.sample(None, [u0, u1], [u_side, rest])?;
             let radiance = environment.radiance_at(sky);
             let [x, y] = warp::concentric_disk(u_disk);
             let frame = Frame::from_normal(wi);

@@ -1,12 +1,13 @@
 //! How the light of an equirectangular image is spread over directions: a table of cells to sample directions from.
 
 use std::f32::consts::TAU;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::facing::{self, Facing, angle};
+use super::bounds::angle;
+use super::facing::{self, Facing};
 use super::grid::Grid;
 use crate::color::Rgb;
 use crate::math::Real;
@@ -153,10 +154,10 @@ impl EnvironmentTable {
         let row = ((v * rows as f32) as usize).min(rows - 1);
         let (region_column, region_row) =
             (part_of(column, self.columns, REGION_COLUMNS), part_of(row, rows, REGION_ROWS));
-        let in_region = &self.in_region[self.region_index(region_column, region_row)]
+        let cell = self.in_region[self.region_index(region_column, region_row)]
             .probability(column - self.region_columns[region_column], row - self.region_rows[region_row]);
         let region = self.regions(normal).probability(region_column, region_row);
-        self.per_solid_angle(row, region * in_region)
+        self.per_solid_angle(row, region * cell)
     }
 
     #[inline]
@@ -312,7 +313,7 @@ const MOST_KEPT: usize = 4;
 impl EnvironmentTables {
     /// The image of the same pixels that a table is known of, if there is one, else `image` itself.
     pub fn known(&self, image: &Arc<Image>) -> Arc<Image> {
-        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = self.lock();
         let found = kept.iter().find(|k| Arc::ptr_eq(&k.image, image) || k.image == *image);
         Arc::clone(found.map_or(image, |k| &k.image))
     }
@@ -328,21 +329,27 @@ impl EnvironmentTables {
             (k.mapping, k.partner) == (mapping, partner)
                 && (Arc::ptr_eq(&k.image, image) || k.image == *image)
         };
-        // A thread that panicked elsewhere has left whole entries.
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = match kept.iter().position(wanted) {
-            Some(found) => kept.remove(found),
-            None => {
-                let table = Arc::new(EnvironmentTable::new(image, mapping, partner));
-                Kept { image: Arc::clone(image), mapping, partner, table }
-            }
+        let take = || {
+            let mut kept = self.lock();
+            kept.iter().position(wanted).map(|place| kept.remove(place))
         };
+        // Made without the lock: rayon's threads may come here again while they wait for parts of it.
+        let entry = take().unwrap_or_else(|| {
+            let table = Arc::new(EnvironmentTable::new(image, mapping, partner));
+            Kept { image: Arc::clone(image), mapping, partner, table }
+        });
+        let table = Arc::clone(&entry.table);
+        let mut kept = self.lock();
         if kept.len() >= MOST_KEPT {
             kept.remove(0);
         }
-        let table = Arc::clone(&entry.table);
         kept.push(entry);
         table
+    }
+
+    /// A thread that panicked elsewhere has left whole entries.
+    fn lock(&self) -> MutexGuard<'_, Vec<Kept>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::bounds::angle;
 use crate::math::Real;
 
 /// Cells along a side of the octahedral map (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors").
@@ -56,11 +57,6 @@ impl Facing {
         let pairs = self.some.iter().flat_map(|n| others.iter().map(|d| d.dot(*n).max(0.0)));
         (pairs.sum::<f32>() / 16.0).max(LEAST_COSINE)
     }
-}
-
-/// The angle between unit vectors.
-pub(super) fn angle(a: Vec3, b: Vec3) -> f32 {
-    Real::acos(a.dot(b).clamp(-1.0, 1.0))
 }
 
 /// The unit direction at a place of the map in [-1, 1]².

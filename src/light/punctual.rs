@@ -30,12 +30,15 @@ pub(super) fn intensity(light: &Light) -> f64 {
     f64::from(light.color.luminance()) * f64::from(light.intensity)
 }
 
+/// Where a spot's edge is hard: floats can't tell the cosine of a smaller angle from 1, nor bounds what is within it.
+const COSINE_MARGIN: f32 = 1e-3;
+
 /// Where a light is that has a place, and where it shines.
 pub(super) fn bounds(light: &Light) -> LightBounds {
     let (place, axis, spread, emission) = match light.kind {
         LightKind::Point { position, .. } => (position, Vec3::Y, PI, FRAC_PI_2),
         LightKind::Spot { position, direction, inner, outer, .. } => {
-            (position, direction, inner, (outer - inner).max(0.0))
+            (position, direction, inner, (outer - inner).max(0.0) + COSINE_MARGIN)
         }
         LightKind::Directional { direction } => (Vec3::ZERO, direction, 0.0, 0.0),
     };

@@ -1,12 +1,13 @@
 //! From samples to pictures: how long to go on, and the layers of the result.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use glam::Vec2;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
+use super::Prepared;
 use super::adaptive::{Plan, Sight};
 use super::integrators::integrate;
 use super::light_image::LightImage;
@@ -14,23 +15,20 @@ use super::path::PathSample;
 use super::replay::ReplayVertex;
 use super::tile::{Block, Level, NAMED_BAD_SAMPLES, Pixel, Tile, levels};
 use super::variants::Variants;
-use super::{Prepared, RenderError};
 use crate::accel::Ray;
 use crate::math::sobol::{Purpose, Sampler};
 use crate::raster::{Layer, Raster, Window};
 use crate::record::Counts;
 
-/// What others may see of a running render, and how they stop it.
+/// What others may see of a running render, and how long it may take.
 #[derive(Debug, Default)]
 pub struct Control {
-    /// Camera paths finished so far.
+    /// Paths finished so far, of the camera and from lights.
     pub paths: AtomicU64,
-    /// Camera paths there will be; 0 until the render begins.
+    /// Paths there will be; 0 until the render begins.
     pub total_paths: AtomicU64,
     /// Stop sampling after so long, if the settings do not end the render before.
     pub time_limit: Option<Duration>,
-    /// Set to stop: the render ends with [`RenderError::Cancelled`].
-    pub stop: AtomicBool,
 }
 
 /// A finished render.
@@ -48,36 +46,34 @@ pub struct Rendered {
 ///
 /// With the settings' number of samples or error, the bits of the result depend on nothing but the scene and the settings; with a limit
 /// of time in `control`, on the machine as well.
-///
-/// # Errors
-/// [`RenderError::Cancelled`] if `control.stop` was set before the end.
-pub fn render(scene: &Prepared, control: &Control) -> Result<Rendered, RenderError> {
-    let mut picture = None;
-    render_together(&Variants::alone(scene), control, |_, rendered| picture = Some(rendered))?;
-    picture.ok_or(RenderError::Cancelled)
+pub fn render(scene: &Prepared, control: &Control) -> Rendered {
+    let (stacks, lit) = sampled(&Variants::alone(scene), control);
+    developed(scene, stacks.into_iter().flatten(), &lit[0])
 }
 
 /// Renders all variants at once, and gives each one's index and picture to `done`: the same bits as [`render`] makes of each, but what
 /// their paths have in common is traced once.
-///
-/// # Errors
-/// As above.
-pub fn render_together(
-    variants: &Variants<'_>,
-    control: &Control,
-    mut done: impl FnMut(usize, Rendered),
-) -> Result<(), RenderError> {
+pub fn render_together(variants: &Variants<'_>, control: &Control, mut done: impl FnMut(usize, Rendered)) {
+    let (mut stacks, lit) = sampled(variants, control);
+    for (variant, (scene, lit)) in variants.scenes().iter().zip(&lit).enumerate() {
+        let tiles = stacks.iter_mut().map(|stack| std::mem::take(&mut stack[variant]));
+        done(variant, developed(scene, tiles, lit));
+    }
+}
+
+/// Takes all samples: at each place of the picture a tile for each variant, and what each one's light paths bring.
+fn sampled(variants: &Variants<'_>, control: &Control) -> (Vec<Vec<Tile>>, Vec<LightImage>) {
     let scenes = variants.scenes();
-    let Some(&first) = scenes.first() else { return Ok(()) };
+    let first = scenes[0];
     let total: u64 = scenes.iter().map(|scene| most_paths(scene)).sum();
     control.total_paths.store(total, Ordering::Relaxed);
-    // At each place of the picture, one tile for each variant.
     let mut stacks: Vec<Vec<Tile>> =
         Tile::all(first).into_iter().map(|tile| vec![tile; scenes.len()]).collect();
     let mut lit: Vec<LightImage> = scenes.iter().map(|scene| LightImage::new(scene)).collect();
     let (mut sights, mut plans): (Vec<Sight>, Vec<Plan>) = (Vec::new(), Vec::new());
-    let deadline = control.time_limit.map(|limit| Instant::now() + limit);
-    for level in levels(first, deadline.is_some()) {
+    // One beyond all clocks never comes.
+    let deadline = control.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+    for level in levels(first, control.time_limit.is_some()) {
         // Every tile gets its first samples, also after the deadline: a picture has no holes.
         let is_late = || deadline.is_some_and(|deadline| Instant::now() >= deadline);
         if is_late() && stacks.iter().flatten().all(|tile| tile.samples > 0) {
@@ -93,25 +89,23 @@ pub fn render_together(
         }
         for (variant, (lit, scene)) in lit.iter_mut().zip(scenes).enumerate() {
             if stacks.iter().any(|stack| !stack[variant].is_finished) {
-                lit.sample_up_to(scene, level.samples, control)?;
+                lit.sample_up_to(scene, level.samples, control);
             }
         }
         // One by one: rayon would leave a run of tiles to one thread while the others are done.
-        stacks.par_iter_mut().with_max_len(1).try_for_each(|stack| {
+        stacks.par_iter_mut().with_max_len(1).for_each(|stack| {
             let ends = is_late() && stack.iter().all(|tile| tile.samples > 0);
-            if ends { Ok(()) } else { sample_up_to(variants, stack, level, &plans, &lit, control) }
-        })?;
+            if !ends {
+                sample_up_to(variants, stack, level, &plans, &lit, control);
+            }
+        });
         if level.is_looked_at {
             let size = Tile::patches_of(first.size());
             let seen = |variant: usize, lit| stacks.iter().flat_map(move |stack| stack[variant].seen(lit));
             sights = (0..).zip(&lit).map(|(variant, lit)| Sight::new(size, seen(variant, lit))).collect();
         }
     }
-    for (variant, (scene, lit)) in scenes.iter().zip(&lit).enumerate() {
-        let tiles = stacks.iter_mut().map(|stack| std::mem::take(&mut stack[variant]));
-        done(variant, developed(scene, tiles, lit));
-    }
-    Ok(())
+    (stacks, lit)
 }
 
 /// Camera and light paths that the settings allow.
@@ -147,37 +141,43 @@ fn sample_up_to(
     plans: &[Plan],
     lit: &[LightImage],
     control: &Control,
-) -> Result<(), RenderError> {
+) {
     let settings = &variants.scenes()[0].settings;
     let going: Vec<usize> = (0..tiles.len()).filter(|&variant| !tiles[variant].is_finished).collect();
-    let Some(&any) = going.first() else { return Ok(()) };
+    let Some(&any) = going.first() else { return };
     for &variant in &going {
         tiles[variant].begin(settings, level.samples, plans.get(variant));
     }
     let blocks: Vec<Block> = tiles[any].blocks(variants.block_sides()).collect();
     for block in &blocks {
-        if control.stop.load(Ordering::Relaxed) {
-            return Err(RenderError::Cancelled);
-        }
         let patch = tiles[any].patch(block[0]);
-        // They began together, and each goes on to its own goal.
-        let mut taken = tiles[any].patches[patch].samples;
-        let goal = |tiles: &[Tile], variant: usize| tiles[variant].patches[patch].goal;
-        loop {
-            let going: SmallVec<[usize; 16]> =
-                going.iter().copied().filter(|&variant| goal(tiles, variant) > taken).collect();
-            let Some(next) = going.iter().map(|&variant| goal(tiles, variant)).min() else { break };
-            sample_block(variants, tiles, &going, block, taken..next);
-            let paths = u64::from(next - taken) * (going.len() * block.len()) as u64;
-            control.paths.fetch_add(paths, Ordering::Relaxed);
-            taken = next;
+        // Each goes on from where it stands to its own goal, with those that want the same samples.
+        let wanted: SmallVec<[_; 16]> = going
+            .iter()
+            .map(|&variant| (variant, tiles[variant].patches[patch]))
+            .map(|(variant, patch)| (variant, patch.samples..patch.goal))
+            .collect();
+        let mut ends: SmallVec<[u32; 32]> =
+            wanted.iter().flat_map(|(_, samples)| [samples.start, samples.end]).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        for &[start, end] in ends.array_windows() {
+            let takers: SmallVec<[usize; 16]> = wanted
+                .iter()
+                .filter(|(_, samples)| samples.contains(&start))
+                .map(|(variant, _)| *variant)
+                .collect();
+            if !takers.is_empty() {
+                sample_block(variants, tiles, &takers, block, start..end);
+                let paths = u64::from(end - start) * (takers.len() * block.len()) as u64;
+                control.paths.fetch_add(paths, Ordering::Relaxed);
+            }
         }
     }
     for variant in going {
         let spared = tiles[variant].end(settings, level, &lit[variant]);
         control.paths.fetch_add(spared, Ordering::Relaxed);
     }
-    Ok(())
 }
 
 /// Takes samples of a block for the tiles of the variants that are `going` on.

@@ -7,10 +7,10 @@ use std::sync::atomic::Ordering;
 
 use rayon::prelude::*;
 
+use super::Prepared;
 use super::film::Control;
 use super::light_path;
 use super::tile::second_half;
-use super::{Prepared, RenderError};
 use crate::color::Rgb;
 use crate::math::hash::mix64;
 use crate::math::sobol::Sampler;
@@ -67,13 +67,8 @@ impl LightImage {
     }
 
     /// Goes on until there are as many light paths as belong to `samples` of each pixel.
-    pub(super) fn sample_up_to(
-        &mut self,
-        scene: &Prepared,
-        samples: u32,
-        control: &Control,
-    ) -> Result<(), RenderError> {
-        let Ok(plan) = &scene.light_paths else { return Ok(()) };
+    pub(super) fn sample_up_to(&mut self, scene: &Prepared, samples: u32, control: &Control) {
+        let Ok(plan) = &scene.light_paths else { return };
         let paths = plan.paths(samples);
         let round = BATCH * (BATCHES * rayon::current_num_threads()) as u64;
         let half = scene.settings.is_halved().then(|| plan.paths(second_half(samples)));
@@ -90,16 +85,12 @@ impl LightImage {
                 .map(|start| {
                     let batch = start..end.min(start + BATCH);
                     control.paths.fetch_add(batch.end - batch.start, Ordering::Relaxed);
-                    if control.stop.load(Ordering::Relaxed) {
-                        return Err(RenderError::Cancelled);
-                    }
-                    Ok(self.trace(scene, batch))
+                    self.trace(scene, batch)
                 })
-                .collect::<Result<_, _>>()?;
+                .collect();
             self.add(&batches);
             self.paths = end;
         }
-        Ok(())
     }
 
     /// The paths of a range of indices.

@@ -95,13 +95,16 @@ pub enum RenderError {
         /// The largest.
         max: f32,
     },
+    /// A light emits more than a float holds.
+    #[error("light {light:?}: its light, colour times intensity, is beyond what a float holds")]
+    LightEmission {
+        /// The light.
+        light: String,
+    },
     /// A material emits more than a float holds.
     #[error("material {material:?}: its emission, colour times strength, is beyond what a float holds")]
     Emission {
         /// The material.
         material: String,
     },
-    /// Somebody asked to stop.
-    #[error("stopped before the image was finished")]
-    Cancelled,
 }

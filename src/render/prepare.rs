@@ -94,6 +94,9 @@ impl Prepared {
         range::check(&scene)?;
         let film_camera = FilmCamera::new(&camera.name, &camera.item, geometry.origin(), width, height)?;
         let materials: Vec<_> = scene.materials.iter().map(|m| PreparedMaterial::new(&m.item)).collect();
+        if let Some(light) = scene.lights.iter().find(|l| !(l.item.color * l.item.intensity).is_finite()) {
+            return Err(RenderError::LightEmission { light: light.name.clone() });
+        }
         for (material, prepared) in scene.materials.iter().zip(&materials) {
             if prepared.mean_emission(&scene).is_some_and(|(radiance, _)| !radiance.is_finite()) {
                 return Err(RenderError::Emission { material: material.name.clone() });
@@ -149,18 +152,10 @@ impl Prepared {
         if !techniques.lobes_by_albedo {
             self.materials = self.materials.into_iter().map(PreparedMaterial::with_equal_lobes).collect();
         }
-        if !techniques.light_paths {
-            self.light_paths = Err("left out".to_owned());
-        }
-        if !techniques.path_reuse {
-            self.path_reuse = Err("left out".to_owned());
-        }
-        if !techniques.adaptive {
-            self.adaptive = Err("left out".to_owned());
-        }
-        if !techniques.splitting {
-            self.splitting = Err("left out".to_owned());
-        }
+        leave_out(&mut self.light_paths, !techniques.light_paths);
+        leave_out(&mut self.path_reuse, !techniques.path_reuse);
+        leave_out(&mut self.adaptive, !techniques.adaptive);
+        leave_out(&mut self.splitting, !techniques.splitting);
         self.all_covered &= techniques.coverage;
         self.all_opaque &= techniques.coverage;
         self.techniques = techniques;
@@ -398,6 +393,12 @@ fn path_reuse(settings: &RenderSettings, all_opaque: bool) -> Result<(), String>
 fn light_partner(settings: &RenderSettings) -> Partner {
     let weighs_both = settings.nee && settings.mis && settings.integrator == Integrator::Path;
     if weighs_both { Partner::Bsdf } else { Partner::None }
+}
+
+fn leave_out<T>(technique: &mut Result<T, String>, is_left_out: bool) {
+    if is_left_out {
+        *technique = Err("left out".to_owned());
+    }
 }
 
 fn collect_lights(

@@ -27,10 +27,10 @@ impl Prepared {
         if self.all_covered {
             skipped.push("opacity: every surface is opaque".to_owned());
         }
-        if !self.scene.materials.iter().any(|m| m.item.transmits()) {
+        let worn = self.worn();
+        if !worn.iter().any(|(material, _)| material.transmits()) {
             skipped.push("transmission: nothing lets light through".to_owned());
         }
-        let worn = self.worn();
         skipped.extend(absent_lobes(&worn));
         skipped.extend(unread_attributes(&worn));
         if let Err(why) = &self.light_paths {

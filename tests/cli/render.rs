@@ -105,7 +105,7 @@ fn a_wrong_path_or_value_is_told_with_a_hint() {
         ("camra.fov=30", "no path begins with `camra`", "did you mean `camera`?"),
         ("material.floor.roughness=1.5", "`material.floor.roughness` is 1.5, but must be", ""),
         ("material.floor.roughness=rough", "is \"rough\", but must be", ""),
-        ("environment.image=none.hdr", "none.hdr", ""),
+        ("environment.image=none.hdr", "`environment.image`: ", ""),
     ] {
         let run = render(&desk, spheres(), &["-o", "a.exr", "--set", set]).ends_with(2).tells(error);
         if !hint.is_empty() {
@@ -236,6 +236,9 @@ fn a_render_ends_at_an_error_or_when_time_is_up() {
     for name in ["pipeline:key", "pipeline:identity"] {
         assert_eq!(attribute(name, "b.exr"), None, "the machine had a say");
     }
+
+    // So many seconds are beyond what clocks count.
+    run(&["-o", "b.exr", "--time-limit", "1e19", "--spp", "4"]).ends_with(0).tells(", 4 samples a pixel");
 
     for (option, value) in [("--error", "0"), ("--error", "2"), ("--error", "nan"), ("--time-limit", "-1")] {
         run(&["-o", "c.exr", &format!("{option}={value}")]).ends_with(64).tells("is expected, such as");

@@ -124,7 +124,7 @@ pub(crate) fn scene(parts: Vec<(Mesh, Material)>, camera: Camera) -> Scene {
 pub(crate) fn render_scene(scene: &Scene, settings: &RenderSettings) -> Rendered {
     let geometry = Arc::new(Geometry::build(scene).expect("geometry"));
     let prepared = Prepared::new(Arc::new(scene.clone()), geometry, settings).expect("prepared");
-    render(&prepared, &Control::default()).expect("rendered")
+    render(&prepared, &Control::default())
 }
 
 /// Settings for a small image.

@@ -148,7 +148,7 @@ fn picture(bytes: &[u8]) -> (Raster, u64) {
     let settings = RenderSettings { width: Some(16), height: Some(16), spp: 4, ..RenderSettings::default() };
     let prepared = Prepared::new(Arc::clone(&loaded.scene), Arc::clone(&loaded.geometry), &settings).unwrap();
     let images = loaded.scene.images.iter().map(|image| image.bytes()).sum();
-    (render(&prepared, &Control::default()).unwrap().raster, images)
+    (render(&prepared, &Control::default()).raster, images)
 }
 
 #[test]

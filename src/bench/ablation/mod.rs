@@ -134,7 +134,7 @@ impl Contest<'_> {
         let geometry = if variant.is_portable() { &self.portable } else { own };
         let scene = self.subject.prepared(planned, geometry)?.with(variant.techniques());
         let what = format!("{}: {}, {samples} samples", self.subject.job.name, variant.name());
-        let (rendered, seconds) = timed(&scene, &what, watch)?;
+        let (rendered, seconds) = timed(&scene, &what, watch);
         let error = error::deviation(rendered.raster.picture(), self.reference.picture()).error;
         Ok(Turn { seconds, error, bits: bits(&rendered.raster), paths: rendered.counts.paths })
     }

@@ -46,12 +46,12 @@ impl Variant {
             ),
             Self::new(
                 "no mis",
-                "light that light samples can find is found by them alone",
+                "light that light samples can find is found by them alone; light paths and path reuse, which weigh both, go too",
                 Change::Settings(|settings| settings.mis = false),
             ),
             Self::new(
                 "no nee",
-                "light is found by chance alone",
+                "light is found by chance alone; light paths and path reuse, which weigh light samples, go too",
                 Change::Settings(|settings| settings.nee = false),
             ),
             Self::new(
