@@ -107,7 +107,8 @@ fn for_each_job(
     for target in &arguments.targets {
         if !target.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             let (import, convert) = (arguments.reading.options(), arguments.conversion.options());
-            act(&described(target, arguments), &job::load(target, &import, &convert, None)?)?;
+            let loaded = job::load(target, &import, &convert, None).map_err(|error| error.told())?;
+            act(&described(target, arguments), &loaded)?;
             continue;
         }
         let sweep = sweep::open(target)?;

@@ -108,18 +108,19 @@ impl Scenes {
         if let Some((_, error)) = self.failed.iter().find(|(reading, _)| reading == wanted) {
             return Err(error.clone());
         }
-        if self.last.as_ref().is_none_or(|(last, _)| last != wanted) {
-            self.last = None;
-            let Reading { path, import, convert } = wanted;
-            match job::load(path, import, convert, self.materials.as_deref()) {
-                Ok(loaded) => self.last = Some((wanted.clone(), loaded)),
-                Err(error) => {
-                    let message = error.to_string();
+        let loaded = match self.last.take() {
+            Some((last, loaded)) if last == *wanted => loaded,
+            other => {
+                // One at a time is in memory.
+                drop(other);
+                let Reading { path, import, convert } = wanted;
+                job::load(path, import, convert, self.materials.as_deref()).map_err(|error| {
+                    let message = error.told();
                     self.failed.push((wanted.clone(), message.clone()));
-                    return Err(message);
-                }
+                    message
+                })?
             }
-        }
-        self.last.as_ref().map(|(_, loaded)| loaded).ok_or_else(String::new)
+        };
+        Ok(&self.last.insert((wanted.clone(), loaded)).1)
     }
 }

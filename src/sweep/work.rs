@@ -48,16 +48,14 @@ impl<'a> Work<'a> {
         loaded: Result<&LoadedScene, String>,
     ) -> Result<(), SweepError> {
         let planned = loaded.and_then(|loaded| {
-            let planned = job::plan(job, loaded, self.build).map_err(|error| error.to_string())?;
+            let planned = job::plan(job, loaded, self.build).map_err(|error| error.told())?;
             Ok((planned, loaded))
         });
         let (planned, loaded) = match planned {
             Ok(pair) => pair,
             Err(error) => {
-                self.render_waiting()?;
                 let record = job::failed_record(job, self.build, &self.destination.folder, &error)?;
-                self.add(index, record, false);
-                return Ok(());
+                return self.add_failed(index, record);
             }
         };
         if !self.options.force
@@ -68,13 +66,20 @@ impl<'a> Work<'a> {
             return Ok(());
         }
         match job::prepare(planned, loaded, self.build, self.destination) {
-            Ok(ready) => self.wait(index, ready)?,
+            Ok(ready) => self.wait(index, ready),
             Err(record) => {
-                self.render_waiting()?;
-                job::keep_record(&record, self.destination)?;
-                self.add(index, *record, false);
+                job::write_record(&record, &self.destination.folder)?;
+                self.add_failed(index, *record)
             }
         }
+    }
+
+    /// A job that can't be rendered: where that ends the sweep, those that came before it are rendered first.
+    fn add_failed(&mut self, index: usize, record: JobRecord) -> Result<(), SweepError> {
+        if self.options.fail_fast {
+            self.render_waiting()?;
+        }
+        self.add(index, record, false);
         Ok(())
     }
 

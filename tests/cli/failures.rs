@@ -65,6 +65,10 @@ fn a_value_that_fails_its_job_leaves_the_others() {
     std::fs::write(desk.path("broken.png"), bytes).unwrap();
     desk.sweep(&[]).ends_with(2).says("2 jobs: 1 rendered, 0 reused, 1 FAILED\n").says("broken.png");
     assert_eq!(desk.images().len(), 1);
+    let record = desk.record("image=broken");
+    let error = error_of(&record);
+    assert!(error.contains("broken.png as `environment.image`: "), "{error}");
+    assert!(error.contains("is damaged"), "it tells why: {error}");
 }
 
 #[test]

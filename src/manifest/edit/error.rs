@@ -90,12 +90,11 @@ pub enum EditError {
     #[error("the scene has no camera")]
     NoCamera,
     /// An image could not be loaded.
-    #[error("cannot use {} as `environment.image`", file.display())]
+    #[error("cannot use {} as `environment.image`: {cause}", file.display())]
     Image {
         /// The file.
         file: PathBuf,
         /// Why not.
-        #[source]
         cause: BoxedError,
     },
     /// An environment's image holds infinities or NaN.
@@ -153,7 +152,6 @@ impl EditError {
                 Some(format!("{meant}it has the {kind}{plural} {}", listed(known)))
             }
             Self::NoCamera => Some("`camera.position` makes one".to_owned()),
-            Self::Image { cause, .. } => Some(cause.to_string()),
             _ => None,
         }
     }
