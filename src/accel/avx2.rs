@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, ControlFlow, Div, Mul, Sub};
 
 use super::lanes::{Floats, Lanes};
-use super::{Bvh, Hit, Ray, traverse, two_levels};
+use super::{Bvh, Hit, Ray, traverse};
 
 /// Proof that the running processor has AVX2: only [`Self::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ impl Avx2 {
         has.then_some(Self(()))
     }
 
-    /// [`traverse::closest`] or [`two_levels::closest`], compiled for AVX2.
+    /// [`traverse::closest`], compiled for AVX2.
     #[inline(always)]
     pub(super) fn closest<const INSTANCES: bool>(
         self,
@@ -39,17 +39,13 @@ impl Avx2 {
             ray: &Ray,
             counts: impl FnMut(&Hit) -> bool,
         ) -> Option<Hit> {
-            if INSTANCES {
-                two_levels::closest(lanes, bvh, ray, counts)
-            } else {
-                traverse::closest(lanes, bvh, ray, counts)
-            }
+            traverse::closest::<_, INSTANCES>(lanes, bvh, ray, counts)
         }
         // SAFETY: `self` proves that the processor has these features.
         unsafe { compiled::<INSTANCES>(self, bvh, ray, counts) }
     }
 
-    /// [`traverse::visit`] or [`two_levels::visit`], compiled for AVX2.
+    /// [`traverse::visit`], compiled for AVX2.
     #[inline(always)]
     pub(super) fn visit<const INSTANCES: bool>(
         self,
@@ -64,11 +60,7 @@ impl Avx2 {
             ray: &Ray,
             visitor: impl FnMut(Hit) -> ControlFlow<()>,
         ) -> bool {
-            if INSTANCES {
-                two_levels::visit(lanes, bvh, ray, visitor)
-            } else {
-                traverse::visit(lanes, bvh, ray, visitor)
-            }
+            traverse::visit::<_, INSTANCES>(lanes, bvh, ray, visitor)
         }
         // SAFETY: `self` proves that the processor has these features.
         unsafe { compiled::<INSTANCES>(self, bvh, ray, visitor) }

@@ -10,8 +10,8 @@ use obvhs::bvh2::builder::build_bvh2;
 use super::block::Block;
 use super::collapse::Plan;
 use super::instance::{Instance, Placement};
+use super::node::MOST_LEVELS;
 use super::places::Places;
-use super::traverse::MOST_LEVELS;
 use super::{Bvh, Child, Kernel, Node};
 
 /// The most triangles: their indices and those of nodes leave a bit for what is what.

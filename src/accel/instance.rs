@@ -31,9 +31,9 @@ use std::ops::{ControlFlow, RangeInclusive};
 use glam::{Affine3A, DMat3, DVec3, Mat3, Vec3};
 
 use super::lanes::{Floats, Lanes, Portable};
-use super::traverse::ROBUST_FAR;
+use super::node::ROBUST_FAR;
+use super::traverse::{Query, Space};
 use super::triangle::ShearedRay;
-use super::two_levels::{Query, Space};
 use super::{Bvh, Child, Node, Ray};
 
 /// A mesh's place in a tree, fit for being traced.

@@ -14,12 +14,12 @@ mod build;
 mod collapse;
 mod instance;
 mod lanes;
+mod node;
 mod places;
 #[cfg(test)]
 mod tests;
 mod traverse;
 mod triangle;
-mod two_levels;
 
 use std::ops::ControlFlow;
 
@@ -197,8 +197,7 @@ impl Bvh {
         match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2(avx2) => avx2.closest::<INSTANCES>(self, ray, counts),
-            Instructions::Portable if INSTANCES => two_levels::closest(Portable, self, ray, counts),
-            Instructions::Portable => traverse::closest(Portable, self, ray, counts),
+            Instructions::Portable => traverse::closest::<_, INSTANCES>(Portable, self, ray, counts),
         }
     }
 
@@ -226,8 +225,7 @@ impl Bvh {
         match self.kernel.0 {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2(avx2) => avx2.visit::<INSTANCES>(self, ray, visitor),
-            Instructions::Portable if INSTANCES => two_levels::visit(Portable, self, ray, visitor),
-            Instructions::Portable => traverse::visit(Portable, self, ray, visitor),
+            Instructions::Portable => traverse::visit::<_, INSTANCES>(Portable, self, ray, visitor),
         }
     }
 

@@ -330,7 +330,7 @@ fn levels(bvh: &Bvh) -> usize {
 #[test]
 fn trees_hold_every_triangle_once_and_are_never_too_deep() {
     let deepest = meshes().iter().map(|triangles| levels(&Bvh::build(triangles).unwrap())).max();
-    assert!(deepest <= Some(traverse::MOST_LEVELS));
+    assert!(deepest <= Some(node::MOST_LEVELS));
     let levels_of_sphere = levels(&Bvh::build(&sphere(24, 48)).unwrap());
     assert!(levels_of_sphere <= 6, "{levels_of_sphere} for 2208 triangles");
     let one = [Vec3::new(-1.0, -1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.0, 1.0, 1.0)];
@@ -339,7 +339,7 @@ fn trees_hold_every_triangle_once_and_are_never_too_deep() {
     for triangles in [vec![one; 20_000], nested.collect(), doubled.collect()] {
         let bvh = Bvh::build(&triangles).unwrap();
         let levels = levels(&bvh);
-        assert!(levels <= traverse::MOST_LEVELS, "{levels}");
+        assert!(levels <= node::MOST_LEVELS, "{levels}");
         assert_eq!(all_hits(&bvh, &Ray::new(Vec3::ZERO, Vec3::Z)).len(), triangles.len());
     }
 }

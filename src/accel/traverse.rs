@@ -1,225 +1,210 @@
-//! How a ray finds its way through a tree without instances.
+//! How a ray finds its way through a tree: in the world and then, where it comes to an instance, in the space of its mesh. For trees without
+//! instances it is compiled apart, as code that knows nothing of them is faster.
 
 use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
+use super::block::Block;
+use super::instance::Inside;
 use super::lanes::{Floats, Lanes};
+use super::node::{Beam, STACK, next_before};
 use super::triangle::ShearedRay;
 use super::{Bvh, Child, Hit, Node, Ray};
 
-/// The levels of inner nodes that a tree may have; the build sees to it.
-pub(super) const MOST_LEVELS: usize = 26;
+/// What a tree's boxes and leaves are to a ray, by the space that they are in.
+pub(super) trait Space<L: Lanes> {
+    /// A bound of where the ray hits what is in the children, never too large nor negative, and which of them it enters before
+    /// `t_max`.
+    fn enter(&self, node: &Node, t_max: f32) -> (L::Floats, u32);
 
-/// Each level on the way down leaves at most seven children behind; one more level joins two trees.
-pub(super) const STACK: usize = 7 * (MOST_LEVELS + 1) + 1;
-
-/// The far plane is moved out by this factor, so that rounding never makes a ray miss a box it grazes (Ize 2013, "Robust BVH
-/// Ray Traversal", JCGT 2:2): 1 + 2γ(3), and for who multiplies the direction's reciprocal by it the rounding of that.
-pub(super) const ROBUST_FAR: f32 = 1.000_000_5;
-
-/// A ray made ready for eight boxes at a time.
-pub(super) struct Beam<L: Lanes> {
-    origin: [L::Floats; 3],
-    /// The direction's reciprocal for near planes and for far ones: one multiplication fewer to wait for in every node.
-    inverse: [[L::Floats; 3]; 2],
-    /// The sides that near planes are on: 1 where it runs towards smaller coordinates.
-    near: [usize; 3],
+    /// Tells `query` what the ray hits in a leaf.
+    fn leaf<Q: Query>(&mut self, leaf: usize, query: &mut Q) -> ControlFlow<()>;
 }
 
-impl<L: Lanes> Beam<L> {
-    /// None for a ray that isn't finite, which hits nothing.
-    #[inline(always)]
-    pub(super) fn new(lanes: L, ray: &Ray) -> Option<Self> {
-        if !(ray.origin.is_finite() && ray.direction.is_finite()) {
-            return None;
-        }
-        let inverse = ray.direction.to_array().map(|d| 1.0 / d);
-        Some(Self {
-            origin: ray.origin.to_array().map(|v| lanes.splat(v)),
-            inverse: [1.0, ROBUST_FAR].map(|factor| inverse.map(|v| lanes.splat(v * factor))),
-            near: inverse.map(|v| usize::from(v.is_sign_negative())),
-        })
-    }
-}
+/// What one wants to know of the hits.
+pub(super) trait Query {
+    /// How far hits are of interest.
+    fn t_max(&self) -> f32;
 
-impl Node {
-    /// Where the ray enters the children, and which of them it enters before `t_max`.
-    ///
-    /// A direction component of 0 makes 0·∞ = NaN where the origin lies in the plane of a face: minimum and maximum then take
-    /// their second operand, and the slab does not cut.
-    #[inline(always)]
-    pub(super) fn enter<L: Lanes>(&self, lanes: L, ray: &Beam<L>, t_max: f32) -> (L::Floats, u32) {
-        let [near_x, far_x] = self.slab(lanes, ray, 0);
-        let [near_y, far_y] = self.slab(lanes, ray, 1);
-        let [near_z, far_z] = self.slab(lanes, ray, 2);
-        let entry = near_x.max(near_y).max(near_z.max(lanes.splat(0.0)));
-        let exit = far_x.min(far_y).min(far_z);
-        (entry, entry.at_most(exit.min(lanes.splat(t_max))))
-    }
+    /// Takes notice of a hit no farther; breaks when it wants no more.
+    fn found(&mut self, hit: Hit) -> ControlFlow<()>;
 
-    /// Where the ray crosses the near and the far planes across an axis.
-    #[inline(always)]
-    fn slab<L: Lanes>(&self, lanes: L, ray: &Beam<L>, axis: usize) -> [L::Floats; 2] {
-        let (sides, near, origin) = (&self.bounds[axis], ray.near[axis], ray.origin[axis]);
-        // The remainder spares a bounds check.
-        let cross =
-            |side: usize, inverse: &[L::Floats; 3]| (lanes.load(&sides[side % 2]) - origin) * inverse[axis];
-        [cross(near, &ray.inverse[0]), cross(near ^ 1, &ray.inverse[1])]
-    }
+    /// Searches what is under `root`.
+    fn search<L: Lanes, S: Space<L>>(
+        &mut self,
+        nodes: &[Node],
+        space: &mut S,
+        root: Child,
+    ) -> ControlFlow<()>;
 
-    /// The nearest of the children that are `entered`, at least one; the others wait, the nearer on top.
+    /// Finds the hits in a block.
     #[inline(always)]
-    pub(super) fn nearest_first(
-        &self,
-        entry: [f32; 8],
-        mut entered: u32,
-        pending: &mut ArrayVec<u64, STACK>,
-    ) -> Child {
-        let mut next = || {
-            let lane = entered.trailing_zeros() as usize % 8;
-            entered &= entered - 1;
-            (entered, lane)
-        };
-        // A child and where the ray enters it, which is never negative, so that keys sort by the entry.
-        let key = |lane: usize| u64::from(entry[lane].to_bits()) << 32 | u64::from(self.child[lane].0);
-        let (rest, lane) = next();
-        // Mostly there is one, which need not wait for where it is entered.
-        if rest == 0 {
-            return self.child[lane];
-        }
-        let one = key(lane);
-        let (mut rest, lane) = next();
-        let other = key(lane);
-        let mut first = one.min(other);
-        let bottom = pending.len();
-        pending.push(one.max(other));
-        while rest != 0 {
-            let (left, lane) = next();
-            rest = left;
-            let other = key(lane);
-            let farther = first.max(other);
-            first = first.min(other);
-            pending.push(farther);
-            let mut at = pending.len() - 1;
-            while at > bottom && pending[at - 1] < farther {
-                pending[at] = pending[at - 1];
-                at -= 1;
-            }
-            pending[at] = farther;
-        }
-        Child(first as u32)
-    }
-
-    /// The first that the tree keeps of the children that are `entered`, at least one; the others wait, the earlier on top.
-    #[inline(always)]
-    pub(super) fn first_kept(&self, entered: u32, pending: &mut ArrayVec<Child, STACK>) -> Child {
-        // Before the others, as the traversal waits for it.
-        let first = self.child[entered.trailing_zeros() as usize % 8];
-        let mut others = entered & (entered - 1);
-        if others & others.wrapping_sub(1) == 0 {
-            // One or none: not told apart by a branch, which could not be guessed.
-            let bottom = pending.len();
-            pending.push(self.child[others.trailing_zeros() as usize % 8]);
-            pending.truncate(bottom + usize::from(others != 0));
-            return first;
-        }
-        while others != 0 {
-            let last = 31 - others.leading_zeros();
-            others ^= 1 << last;
-            pending.push(self.child[last as usize % 8]);
-        }
-        first
+    fn look_at<L: Lanes>(&mut self, lanes: L, block: &Block, ray: &ShearedRay) -> ControlFlow<()> {
+        let t_max = self.t_max();
+        block.each_hit(lanes, ray, t_max, |hit| self.found(hit))
     }
 }
 
-/// What waits on top; what begins behind `t_max` is left out.
-#[inline(always)]
-pub(super) fn next_before(t_max: f32, pending: &mut ArrayVec<u64, STACK>) -> Option<Child> {
-    loop {
-        let key = pending.pop()?;
-        if f32::from_bits((key >> 32) as u32) <= t_max {
-            return Some(Child(key as u32));
+/// The world, in which the tree has its root, and maybe `INSTANCES`.
+struct World<'a, L: Lanes, const INSTANCES: bool> {
+    lanes: L,
+    bvh: &'a Bvh,
+    ray: &'a Ray,
+    beam: Beam<L>,
+    /// Many rays meet no leaf.
+    sheared: Option<ShearedRay>,
+}
+
+impl<'a, L: Lanes, const INSTANCES: bool> World<'a, L, INSTANCES> {
+    #[inline(always)]
+    fn new(lanes: L, bvh: &'a Bvh, ray: &'a Ray) -> Option<Self> {
+        let beam = Beam::new(lanes, ray)?;
+        Some(Self { lanes, bvh, ray, beam, sheared: None })
+    }
+}
+
+impl<L: Lanes, const INSTANCES: bool> Space<L> for World<'_, L, INSTANCES> {
+    #[inline(always)]
+    fn enter(&self, node: &Node, t_max: f32) -> (L::Floats, u32) {
+        node.enter(self.lanes, &self.beam, t_max)
+    }
+
+    #[inline(always)]
+    fn leaf<Q: Query>(&mut self, leaf: usize, query: &mut Q) -> ControlFlow<()> {
+        let sheared = self.sheared.get_or_insert_with(|| ShearedRay::new(self.ray));
+        if INSTANCES && let Some(instance) = self.bvh.instance(leaf) {
+            let mut inside = Inside::new(self.lanes, self.bvh, instance, self.ray, sheared);
+            return query.search(&self.bvh.nodes, &mut inside, instance.root);
         }
+        query.look_at(self.lanes, &self.bvh.blocks[leaf], sheared)
     }
 }
 
 /// The nearest of the hits that `counts`, among equally near ones the one of the lowest index.
 #[inline(always)]
-pub(super) fn closest<L: Lanes>(
+pub(super) fn closest<L: Lanes, const INSTANCES: bool>(
     lanes: L,
     bvh: &Bvh,
     ray: &Ray,
-    mut counts: impl FnMut(&Hit) -> bool,
+    counts: impl FnMut(&Hit) -> bool,
 ) -> Option<Hit> {
-    let beam = Beam::new(lanes, ray)?;
-    // Many rays meet no leaf.
-    let mut sheared = None;
-    let mut nearest = None;
+    let mut world = World::<L, INSTANCES>::new(lanes, bvh, ray)?;
     // No index is lower than 0: the ray's end itself is out of reach.
-    let (mut t_max, mut rival) = (ray.t_max, 0);
-    let mut pending = ArrayVec::<u64, STACK>::new();
-    let mut child = bvh.root;
-    loop {
-        if let Some(leaf) = child.leaf() {
-            let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
-            let _ = bvh.blocks[leaf].each_hit(lanes, sheared, t_max, |hit| {
-                let is_nearer = hit.t < t_max || (hit.t == t_max && hit.triangle < rival);
-                if is_nearer && counts(&hit) {
-                    (t_max, rival) = (hit.t, hit.triangle);
-                    nearest = Some(hit);
-                }
-                ControlFlow::Continue(())
-            });
-        } else {
-            let node = &bvh.nodes[child.node()];
-            let (entry, entered) = node.enter(lanes, &beam, t_max);
-            if entered != 0 {
-                child = node.nearest_first(entry.to_array(), entered, &mut pending);
-                continue;
-            }
+    let mut query = Nearest { t_max: ray.t_max, rival: 0, nearest: None, counts };
+    let _ = query.search(&bvh.nodes, &mut world, bvh.root);
+    query.nearest
+}
+
+/// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
+#[inline(always)]
+pub(super) fn visit<L: Lanes, const INSTANCES: bool>(
+    lanes: L,
+    bvh: &Bvh,
+    ray: &Ray,
+    visitor: impl FnMut(Hit) -> ControlFlow<()>,
+) -> bool {
+    let Some(mut world) = World::<L, INSTANCES>::new(lanes, bvh, ray) else { return false };
+    let mut query = Each { t_max: ray.t_max, visitor };
+    query.search(&bvh.nodes, &mut world, bvh.root).is_break()
+}
+
+/// Asks for the nearest hit that counts.
+struct Nearest<C> {
+    t_max: f32,
+    /// The triangle of the nearest hit so far.
+    rival: u32,
+    nearest: Option<Hit>,
+    counts: C,
+}
+
+impl<C: FnMut(&Hit) -> bool> Query for Nearest<C> {
+    #[inline(always)]
+    fn t_max(&self) -> f32 {
+        self.t_max
+    }
+
+    #[inline(always)]
+    fn found(&mut self, hit: Hit) -> ControlFlow<()> {
+        let is_nearer = hit.t < self.t_max || (hit.t == self.t_max && hit.triangle < self.rival);
+        if is_nearer && (self.counts)(&hit) {
+            (self.t_max, self.rival) = (hit.t, hit.triangle);
+            self.nearest = Some(hit);
         }
-        match next_before(t_max, &mut pending) {
-            Some(next) => child = next,
-            None => return nearest,
+        ControlFlow::Continue(())
+    }
+
+    /// The nearest child first.
+    #[inline(always)]
+    fn search<L: Lanes, S: Space<L>>(
+        &mut self,
+        nodes: &[Node],
+        space: &mut S,
+        root: Child,
+    ) -> ControlFlow<()> {
+        let mut pending = ArrayVec::<u64, STACK>::new();
+        let mut child = root;
+        loop {
+            if let Some(leaf) = child.leaf() {
+                space.leaf(leaf, self)?;
+            } else {
+                let node = &nodes[child.node()];
+                let (entry, entered) = space.enter(node, self.t_max);
+                if entered != 0 {
+                    child = node.nearest_first(entry.to_array(), entered, &mut pending);
+                    continue;
+                }
+            }
+            match next_before(self.t_max, &mut pending) {
+                Some(next) => child = next,
+                None => return ControlFlow::Continue(()),
+            }
         }
     }
 }
 
-/// Calls `visitor` with the hits in no particular order until it breaks; tells whether it did.
-///
-/// Children are visited in the order that the tree keeps them: those first that most likely hide something for the least work.
-#[inline(always)]
-pub(super) fn visit<L: Lanes>(
-    lanes: L,
-    bvh: &Bvh,
-    ray: &Ray,
-    mut visitor: impl FnMut(Hit) -> ControlFlow<()>,
-) -> bool {
-    let Some(beam) = Beam::new(lanes, ray) else { return false };
-    let mut sheared = None;
-    let mut pending = ArrayVec::<Child, STACK>::new();
-    let mut child = bvh.root;
-    loop {
-        if let Some(leaf) = child.leaf() {
-            let sheared = sheared.get_or_insert_with(|| ShearedRay::new(ray));
-            let went_through = bvh.blocks[leaf].each_hit(lanes, sheared, ray.t_max, |hit| {
-                if hit.t < ray.t_max { visitor(hit) } else { ControlFlow::Continue(()) }
-            });
-            if went_through.is_break() {
-                return true;
+/// Asks for every hit.
+struct Each<V> {
+    t_max: f32,
+    visitor: V,
+}
+
+impl<V: FnMut(Hit) -> ControlFlow<()>> Query for Each<V> {
+    #[inline(always)]
+    fn t_max(&self) -> f32 {
+        self.t_max
+    }
+
+    #[inline(always)]
+    fn found(&mut self, hit: Hit) -> ControlFlow<()> {
+        if hit.t < self.t_max { (self.visitor)(hit) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Children are visited in the order that the tree keeps them: those first that most likely hide something for the least work.
+    #[inline(always)]
+    fn search<L: Lanes, S: Space<L>>(
+        &mut self,
+        nodes: &[Node],
+        space: &mut S,
+        root: Child,
+    ) -> ControlFlow<()> {
+        let mut pending = ArrayVec::<Child, STACK>::new();
+        let mut child = root;
+        loop {
+            if let Some(leaf) = child.leaf() {
+                space.leaf(leaf, self)?;
+            } else {
+                let node = &nodes[child.node()];
+                let (_, entered) = space.enter(node, self.t_max);
+                if entered != 0 {
+                    child = node.first_kept(entered, &mut pending);
+                    continue;
+                }
             }
-        } else {
-            let node = &bvh.nodes[child.node()];
-            let (_, entered) = node.enter(lanes, &beam, ray.t_max);
-            if entered != 0 {
-                child = node.first_kept(entered, &mut pending);
-                continue;
+            match pending.pop() {
+                Some(next) => child = next,
+                None => return ControlFlow::Continue(()),
             }
-        }
-        match pending.pop() {
-            Some(next) => child = next,
-            None => return false,
         }
     }
 }
