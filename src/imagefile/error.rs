@@ -37,7 +37,7 @@ pub enum ImageFileError {
     },
     /// Its first bytes are none that are known.
     #[error(
-        "{name} is not an image that can be read: it is {what}; OpenEXR, PNG, JPEG and Radiance HDR are read"
+        "{name} is not an image that can be read: it is {what}; OpenEXR, PNG, JPEG, WebP, KTX2 and Radiance HDR are read"
     )]
     UnknownFormat {
         /// The image.

@@ -108,6 +108,22 @@ fn gltf_that_asks_for_the_same_again_and_again() {
         });
         desk(&[("t.bin", &positions()), ("t.gltf", &bytes)])
     };
+    // 65,536 bytes of zeros each, all in one place.
+    let mut zeros_by_meshopt = vec![0xa1];
+    zeros_by_meshopt.extend([0b1010_1010; 64]);
+    zeros_by_meshopt.extend([0; 24]);
+    let unpacked = triangle(|j| {
+        let length = zeros_by_meshopt.len();
+        j["buffers"] = json!([{"byteLength": length, "uri": "t.bin"}]);
+        let packed = json!({"EXT_meshopt_compression": {
+            "buffer": 0, "byteLength": length, "byteStride": 4, "count": 16_384, "mode": "ATTRIBUTES",
+        }});
+        let view = json!({"buffer": 0, "byteLength": 65_536, "byteStride": 4, "extensions": packed});
+        j["bufferViews"] = json!(vec![view; 1100]);
+        j["extensionsUsed"] = json!(["EXT_meshopt_compression"]);
+    });
+    let packed = desk(&[("t.bin", &zeros_by_meshopt), ("t.gltf", &unpacked)]);
+    render(&packed, "t.gltf", &[]).ends_with(2).tells("unpacked bytes, more than any file of its size");
     for desk in [instances(60, "a".to_owned()), instances(1, "long".repeat(100_000))] {
         render(&desk, "t.gltf", &[]).ends_with(2).tells("t.gltf: ").tells("for meshes and instances");
     }
@@ -411,6 +427,10 @@ fn a_sweep_lets_its_scenes_read_outside_by_flag_or_key() {
     desk.sweep(&["--dry-run"]).ends_with(2).tells("--allow-outside");
     desk.sweep(&["--dry-run", "--allow-outside"]).ends_with(0);
     desk.sweep(ALLOW).ends_with(0).says("1 job: 1 rendered");
+    let bench = ["bench", "sweep.toml", "--levels", "1", "--seeds", "1", "--reference", "2", "-o", "bench"];
+    desk.run(bench).ends_with(2).tells("--allow-outside");
+    desk.run(bench.iter().chain(ALLOW)).ends_with(0);
+    desk.run(bench.iter().chain(&["--time", "1"])).ends_with(2).tells("hint: [set] with import.…");
     desk.rewrite(&format!("allow_outside = true\n{small}"));
     // What may be read is no part of the job.
     desk.sweep(&[]).ends_with(0).says("1 job: 0 rendered, 1 reused");

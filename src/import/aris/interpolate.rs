@@ -66,14 +66,18 @@ impl Resolver<'_> {
         let mut out = String::new();
         let mut rest = text.as_str();
         while let Some(at) = rest.find("${") {
-            // An odd number of backslashes makes it text.
-            if rest[..at].ends_with('\\') {
-                out += &rest[..at - 1];
+            // An odd number of backslashes makes it text, and each pair of them is one.
+            let before = rest[..at].trim_end_matches('\\');
+            let backslashes = at - before.len();
+            out += before;
+            out += &"\\".repeat(backslashes / 2);
+            if !backslashes.is_multiple_of(2) {
                 out += "${";
                 rest = &rest[at + 2..];
                 continue;
             }
-            let Some(name) = rest[at + 2..].split_once('}').map(|(name, _)| name) else {
+            rest = &rest[at..];
+            let Some(name) = rest[2..].split_once('}').map(|(name, _)| name) else {
                 return error(format!("{text:?} has an interpolation without end"), "as in ${scene.width}");
             };
             if name.contains([':', '$', '{']) {
@@ -98,7 +102,7 @@ impl Resolver<'_> {
                     );
                 }
             }
-            if at == 0 && name.len() + 3 == text.len() {
+            if name.len() + 3 == text.len() {
                 return match value {
                     // What stands inside may have interpolations of its own.
                     Value::Map(_) | Value::List(_) if has_interpolation(&value) => error(
@@ -108,12 +112,11 @@ impl Resolver<'_> {
                     value => Ok(value),
                 };
             }
-            out += &rest[..at];
             out += &match value {
                 Value::Text(text) => text,
                 other => inline(&other),
             };
-            rest = &rest[at + 3 + name.len()..];
+            rest = &rest[3 + name.len()..];
         }
         out += rest;
         Ok(Value::Text(out))
@@ -165,6 +168,9 @@ mod tests {
             ("n: cbox\np: data/${n}_${n}.obj\n", "{n: cbox, p: data/cbox_cbox.obj}"),
             ("a: ${b}\nb: ${c}\nc: [1, 2]\n", "{a: [1, 2], b: [1, 2], c: [1, 2]}"),
             ("a: '\\${b}'\n", "{a: '${b}'}"),
+            // As OmegaConf has it: pairs of backslashes are one, and let what follows be.
+            ("b: 1\na: 'x\\\\${b}'\n", "{b: 1, a: x\\1}"),
+            ("b: 1\na: '\\\\\\${b} ${b}'\n", "{b: 1, a: '\\${b} 1'}"),
         ] {
             assert_eq!(resolved(text).unwrap_or_else(|e| panic!("{text}: {e}")), expected, "{text}");
         }

@@ -17,6 +17,10 @@ use crate::scene::source::{ArisBrdf, ArisDisney, ArisMaterial, SourceMaterial};
 use crate::scene::texture::Pixels;
 use crate::scene::{Camera, Environment, ImageId, Instance, MaterialId, Mesh, MeshId, Named, Scene};
 
+/// What transformed copies of meshes may take however small the files are, and for each byte of those.
+const FREE_COPIES: u64 = 32 << 20;
+const COPIED_PER_BYTE: u64 = 64;
+
 /// The largest picture's side.
 const MAX_SIDE: u32 = 65_536;
 
@@ -120,6 +124,7 @@ fn read_geometry(
         }
     };
     let mut names = Vec::new();
+    let (mut read, mut copied) = (0u64, 0u64);
     // Files that are named several times are read once, and shared where they are not transformed.
     let mut loaded: BTreeMap<String, (Arc<Mesh>, Option<MeshId>)> = BTreeMap::new();
     for (i, item) in items.iter().enumerate() {
@@ -133,6 +138,7 @@ fn read_geometry(
                 cause,
                 hint: String::new(),
             })?;
+            read = read.saturating_add(bytes.len() as u64);
             let mesh = obj::read_mesh(path, &bytes, warnings).map_err(|cause| ArisError::Mesh {
                 place,
                 key: key.clone(),
@@ -144,6 +150,18 @@ fn read_geometry(
         let Some((mesh, shared)) = loaded.get_mut(path) else { continue };
         let id = match transforms.get(i).filter(|steps| !steps.is_empty()) {
             Some(steps) => {
+                copied = copied.saturating_add(mesh.bytes() as u64);
+                let limit = FREE_COPIES.saturating_add(COPIED_PER_BYTE.saturating_mul(read));
+                if copied > limit {
+                    return Err(ArisError::Unsupported {
+                        place: item.place.to_string(),
+                        what: format!(
+                            "a transformed copy of a mesh with which they take more than {limit} bytes"
+                        ),
+                        hint: "a file that holds the mesh as often takes no more memory than it has bytes"
+                            .to_owned(),
+                    });
+                }
                 scene.meshes.push(Arc::new(transformed(mesh, steps, item, &key)?));
                 next
             }
@@ -257,10 +275,16 @@ fn read_brdf(index: usize, node: &Node, warnings: &mut Vec<Warning>) -> Result<A
     let brdf = match name {
         "diffuse" => ArisBrdf::Diffuse { color: reflectance(&mut config, &label)? },
         "mirror" => ArisBrdf::Mirror,
-        "dielectric" => ArisBrdf::Dielectric {
-            ext_ior: positive(&mut config, &label, "ext_ior")?,
-            int_ior: positive(&mut config, &label, "int_ior")?,
-        },
+        "dielectric" => {
+            let ext_ior = positive(&mut config, &label, "ext_ior")?;
+            let int_ior = positive(&mut config, &label, "int_ior")?;
+            let (ratio, least, most) = (int_ior / ext_ior, Parameter::Ior.min(), Parameter::Ior.max());
+            if !(least..=most).contains(&ratio) {
+                let key = format!("{label}.int_ior over {label}.ext_ior");
+                return Err(node.out_of_range(&key, f64::from(ratio), format!("in [{least}, {most}]")));
+            }
+            ArisBrdf::Dielectric { ext_ior, int_ior }
+        }
         "microfacet" => {
             let node = config.require("roughness")?;
             let roughness = in_range(node, &format!("{label}.roughness"), 0.0, 1.0)?;

@@ -144,6 +144,33 @@ fn every_brdf_is_read() {
 }
 
 #[test]
+fn many_transformed_copies_of_a_large_mesh_are_told() {
+    let faces = "f 1 2 3\nf 3 2 1\n".repeat(10_000);
+    let mesh = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}");
+    let copies = |count: usize| {
+        let (paths, brdf) = (vec!["data/b.obj"; count].join(", "), vec!["{name: mirror}"; count].join(", "));
+        let steps = vec!["[{type: scale, params: [2, 2, 2]}]"; count].join(", ");
+        let geometry = format!("name: mesh, config: {{paths: [{paths}], transforms: [{steps}]}}");
+        let scene = format!("geometry: {{{geometry}}}\n{CAMERA}brdf: [{brdf}]\n");
+        import_scene(&scene, &[("data/b.obj", mesh.as_bytes())])
+    };
+    assert!(copies(20).is_ok());
+    let told = copies(400).unwrap_err().to_string();
+    assert!(told.contains("a transformed copy of a mesh with which they take more than"), "{told}");
+}
+
+#[test]
+fn an_index_of_glass_that_no_material_may_have_is_told() {
+    let glass = |ext: f32, int: f32| {
+        let brdf = format!("{{name: dielectric, config: {{ext_ior: {ext}, int_ior: {int}}}}}");
+        format!("geometry:\n  name: mesh\n  config:\n    paths: [data/a.obj]\n{CAMERA}brdf: [{brdf}]\n")
+    };
+    assert!(import_scene(&glass(1.5, 1.0), &[]).is_ok());
+    let told = error(&glass(0.01, 1.5), &[]);
+    assert!(told.contains("brdf[0].int_ior over brdf[0].ext_ior is 150, but must be in [0.1, 10]"), "{told}");
+}
+
+#[test]
 fn transforms_move_positions_and_leave_normals() {
     let text = format!(
         "geometry:\n  name: mesh\n  config:\n    paths: [data/a.obj, data/a.obj]\n    transforms:\n      - - {{type: scale, params: [2, 3, -4]}}\n\

@@ -83,8 +83,12 @@ impl Pose {
                 Property::Scale => moved.scale = track.value(lerp)?,
                 Property::Rotation => moved.rotation = track.value(slerp)?,
                 Property::MorphTargetWeights => {
-                    let mesh = json.mesh.map_or(u32::MAX as usize, |mesh| mesh.value());
-                    let mesh = lookup(&root.meshes, mesh, &format!("nodes[{node}]"), "meshes")?;
+                    let element = format!("nodes[{node}]");
+                    let Some(mesh) = json.mesh else {
+                        let property = "mesh, whose weights an animation moves";
+                        return Err(GltfError::Missing { element, property });
+                    };
+                    let mesh = lookup(&root.meshes, mesh.value(), &element, "meshes")?;
                     let targets = mesh.primitives.iter().flat_map(|p| &p.targets).map(Vec::len).max();
                     let weights = track.values::<1>(targets.unwrap_or(0), lerp)?;
                     moved.weights = Some(weights.into_iter().map(|[weight]| weight).collect());

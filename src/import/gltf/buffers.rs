@@ -16,13 +16,18 @@ use crate::import::Files;
 /// The most bytes that all buffers of a file may have together.
 const MAX_TOTAL: u64 = 8 << 30;
 
+/// The most that may be unpacked of a file however small it is, and for each byte that it was read from.
+const FREE_UNPACKED: u64 = 64 << 20;
+const UNPACKED_PER_BYTE: u64 = 256;
+
 /// The bytes of every buffer, checked to be as many as the file says.
 pub(super) struct Buffers<'a> {
     /// Index into `contents` and the length that the file declares.
     buffers: Vec<(usize, usize)>,
     contents: Vec<Cow<'a, [u8]>>,
-    /// The bytes of all of them.
+    /// The bytes of all of them, and those of them that were unpacked.
     total: u64,
+    unpacked: u64,
     /// Those of the files and strings that they were read from, each once.
     stored: u64,
 }
@@ -30,7 +35,7 @@ pub(super) struct Buffers<'a> {
 impl<'a> Buffers<'a> {
     /// Reads every buffer: the GLB's own chunk, data: URIs, and files, each once.
     pub(super) fn load(document: &Document<'a>, files: &mut Files) -> Result<Self, GltfError> {
-        let mut loaded = Self { buffers: Vec::new(), contents: Vec::new(), total: 0, stored: 0 };
+        let mut loaded = Self { buffers: Vec::new(), contents: Vec::new(), total: 0, unpacked: 0, stored: 0 };
         let mut by_name: BTreeMap<String, usize> = BTreeMap::new();
         for (i, buffer) in document.root.buffers.iter().enumerate() {
             let element = format!("buffers[{i}]");
@@ -95,32 +100,43 @@ impl<'a> Buffers<'a> {
         Ok(())
     }
 
+    /// Counts what is unpacked: few bytes may be packed again and again.
+    fn charge_unpacked(&mut self, bytes: u64) -> Result<(), GltfError> {
+        self.unpacked = self.unpacked.saturating_add(bytes);
+        let limit = FREE_UNPACKED.saturating_add(UNPACKED_PER_BYTE.saturating_mul(self.stored));
+        if self.unpacked > limit {
+            return Err(GltfError::TooMany { what: "unpacked bytes, more than any file of its size", limit });
+        }
+        self.charge(bytes)
+    }
+
     /// Decompresses every view of `root` that meshopt has packed: it then lies in a buffer of its own.
     pub(super) fn decompress(&mut self, root: &mut Root) -> Result<(), GltfError> {
         for (i, view) in root.buffer_views.iter_mut().enumerate() {
             let Some(packed) = Compressed::of(view)? else { continue };
             let element = format!("bufferViews[{i}]");
+            self.charge_unpacked(view.byte_length.0)?;
             let data = self.range(packed.buffer, packed.byte_offset, packed.byte_length, &element)?;
             let bytes = packed.decode(view, data, &element)?;
             view.byte_offset = None;
-            view.buffer = Index::new(self.add(bytes)?);
+            view.buffer = Index::new(self.add(bytes));
         }
         Ok(())
     }
 
     /// A new buffer of `bytes`.
-    fn add(&mut self, bytes: Vec<u8>) -> Result<u32, GltfError> {
-        self.charge(bytes.len() as u64)?;
+    fn add(&mut self, bytes: Vec<u8>) -> u32 {
         let length = bytes.len();
         let content = self.push(Cow::Owned(bytes));
         self.buffers.push((content, length));
-        Ok(self.buffers.len() as u32 - 1)
+        self.buffers.len() as u32 - 1
     }
 
     /// A new view in `root` of a new buffer of `bytes`.
     pub(super) fn add_view(&mut self, root: &mut Root, bytes: Vec<u8>) -> Result<u32, GltfError> {
         let byte_length = USize64(bytes.len() as u64);
-        let buffer = Index::new(self.add(bytes)?);
+        self.charge_unpacked(byte_length.0)?;
+        let buffer = Index::new(self.add(bytes));
         root.buffer_views.push(View {
             buffer,
             byte_length,

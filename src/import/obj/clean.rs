@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 
 use glam::Vec3;
 
+use super::mtl::unquoted;
 use super::polygon::MAX_CORNERS;
 use super::smoothing::SmoothNormals;
 use super::{Grouping, ObjError};
@@ -319,7 +320,8 @@ impl Faces<'_> {
                 self.current = None;
             }
             "usemtl" => {
-                self.material = (!rest.is_empty()).then(|| rest.to_owned());
+                let name = unquoted(rest);
+                self.material = (!name.is_empty()).then(|| name.to_owned());
                 self.current = None;
             }
             "mtllib" => self.out.libraries.push((rest.to_owned(), line)),

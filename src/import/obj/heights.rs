@@ -27,6 +27,11 @@ pub(super) fn normals(image: &Image, channel: TextureChannel, wrap: Wrap) -> Ima
     Image { name: format!("{stem}-normals.png"), width, height, channels: 3, pixels: Pixels::U16(pixels) }
 }
 
+/// What the [`normals`] of an image take, in bytes.
+pub(super) fn normals_bytes(image: &Image) -> u64 {
+    u64::from(image.width) * u64::from(image.height) * 3 * size_of::<u16>() as u64
+}
+
 /// Texels that are looked at to tell normals from heights.
 const LOOKED_AT: u32 = 4096;
 

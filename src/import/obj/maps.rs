@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::heights;
+use crate::imagefile::ImageFileError;
 use crate::import::{Files, Images, Reach};
 use crate::record::Warning;
 use crate::scene::material::TextureChannel;
@@ -136,7 +137,16 @@ impl Maps {
             }
             let Some(image) = self.image(files, &found.name, &mut warn) else { continue };
             map.has_alpha = matches!(self.images[image.0 as usize].channels, 2 | 4);
-            let image = if *slot == MtlSlot::Bump { self.normals(image, map) } else { image };
+            let image = match slot {
+                MtlSlot::Bump => match self.normals(image, map) {
+                    Ok(normals) => normals,
+                    Err(error) => {
+                        warn(format!("{error}; the map is left out"));
+                        continue;
+                    }
+                },
+                _ => image,
+            };
             map.texture = Some(self.texture(image, encoding(*slot), map.wrap));
         }
     }
@@ -171,19 +181,23 @@ impl Maps {
     }
 
     /// The normals of a bump map's image: its own, or those of the heights that it holds.
-    fn normals(&mut self, image: ImageId, map: &mut MtlMap) -> ImageId {
+    fn normals(&mut self, image: ImageId, map: &mut MtlMap) -> Result<ImageId, ImageFileError> {
         let source = &self.images[image.0 as usize];
         map.holds_normals = map.channel.is_none() && heights::are_normals(source);
         if map.holds_normals {
-            return image;
+            return Ok(image);
         }
         let channel = map.channel.unwrap_or(TextureChannel::Y);
-        let next = ImageId(self.images.len() as u32);
-        let known = *self.of_heights.entry((image, channel.name(), map.wrap.name())).or_insert(next);
-        if known == next {
-            self.images.push(Arc::new(heights::normals(source, channel, map.wrap)));
+        let key = (image, channel.name(), map.wrap.name());
+        if let Some(&known) = self.of_heights.get(&key) {
+            return Ok(known);
         }
-        known
+        self.decoder.count(heights::normals_bytes(source), &source.name)?;
+        let normals = heights::normals(source, channel, map.wrap);
+        let next = ImageId(self.images.len() as u32);
+        self.images.push(Arc::new(normals));
+        self.of_heights.insert(key, next);
+        Ok(next)
     }
 
     fn texture(&mut self, image: ImageId, encoding: Encoding, wrap: Wrap) -> TextureId {

@@ -221,17 +221,18 @@ fn used_materials(
 ) -> Vec<(String, MtlMaterial, String)> {
     let mut found = Vec::new();
     let mut missing = Vec::new();
-    let mut seen = BTreeSet::new();
+    let (mut seen, mut of_library) = (BTreeSet::new(), BTreeSet::new());
     let mut colors_left_out = false;
     for part in parts {
         let name = part.material.as_deref().unwrap_or(DEFAULT_MATERIAL);
-        colors_left_out |= library.contains_key(name) && !part.mesh.colors.is_empty();
-        if !seen.insert(name) {
-            continue;
-        }
-        if let Some((order, material, folder)) = library.remove(name) {
-            colors_left_out |= !part.mesh.colors.is_empty();
+        let is_new = seen.insert(name);
+        if is_new && let Some((order, material, folder)) = library.remove(name) {
+            of_library.insert(name);
             found.push((order, (name.to_owned(), material, folder)));
+        }
+        let is_of_library = of_library.contains(name);
+        colors_left_out |= is_of_library && !part.mesh.colors.is_empty();
+        if is_of_library || !is_new {
             continue;
         }
         if part.material.is_some() {

@@ -259,7 +259,8 @@ fn finite(word: &str) -> Option<f32> {
     word.parse::<f32>().ok().filter(|value| value.is_finite())
 }
 
-fn unquoted(name: &str) -> &str {
+/// Names may stand in quotes.
+pub(super) fn unquoted(name: &str) -> &str {
     let inner = name.strip_prefix('"').and_then(|n| n.strip_suffix('"'));
     inner.or_else(|| name.strip_prefix('\'').and_then(|n| n.strip_suffix('\''))).unwrap_or(name).trim()
 }

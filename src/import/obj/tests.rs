@@ -224,6 +224,9 @@ fn libraries_and_maps_are_found_and_missing_ones_told() {
     assert!(material.map(MtlSlot::D).unwrap().has_alpha);
     assert!(material.map(MtlSlot::Kd).unwrap().texture.is_some());
     assert!(material.map(MtlSlot::Ka).unwrap().texture.is_none(), "not read, so not loaded");
+    let quoted = text.replace("red paint", "\"red paint\"");
+    let (scene, _) = import_with(&quoted, &[("my lib.mtl", library)]).unwrap();
+    assert_eq!(mtl(&scene, "red paint").kd, Some(Rgb::new(1.0, 0.0, 0.0)), "names may stand in quotes");
     let text: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     assert_eq!(text.len(), 2, "{text:?}");
     assert!(text[0].starts_with("a.obj:2: material library \"gone.mtl\" is not there"), "{text:?}");
