@@ -12,7 +12,7 @@ use crate::bench::{self, Bench, BenchError, Plan, Subject, Watch, summarize};
 use crate::imagefile::{encode_png, write_whole};
 use crate::job::{self, Build, LoadedScene};
 use crate::record::Job;
-use crate::settings::RenderSettings;
+use crate::settings::{ConvertOptions, ImportOptions, Reach, RenderSettings};
 use crate::sweep::{self, Scenes};
 
 /// Measure error against time: how much work scenes are, and whether their pictures are right on average; what each technique of the
@@ -104,14 +104,24 @@ fn for_each_job(
     arguments: &Arguments,
     mut act: impl FnMut(&Job, &LoadedScene) -> Result<(), Box<dyn std::error::Error>>,
 ) -> Result<(), Box<dyn std::error::Error>> {
+    let (import, convert) = (arguments.reading.options(), arguments.conversion.options());
     for target in &arguments.targets {
         if !target.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-            let (import, convert) = (arguments.reading.options(), arguments.conversion.options());
             let loaded = job::load(target, &import, &convert, None).map_err(|error| error.told())?;
             act(&described(target, arguments), &loaded)?;
             continue;
         }
-        let sweep = sweep::open(target)?;
+        let reach = import.reach;
+        let usual = (ImportOptions { reach, ..ImportOptions::default() }, ConvertOptions::default());
+        if (&import, &convert) != (&usual.0, &usual.1) {
+            let why =
+                "a manifest says itself how its scenes are read; hint: [set] with import.… and convert.…";
+            return Err(format!("{}: {why}", target.display()).into());
+        }
+        let mut sweep = sweep::open(target)?;
+        if reach != Reach::default() {
+            sweep.reach = reach;
+        }
         let mut scenes = Scenes::of(&sweep);
         for (_, job, reading) in scenes.in_order(&sweep.jobs)? {
             act(job, scenes.get(&reading)?)?;

@@ -109,13 +109,19 @@ pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     match arguments.mode {
         Mode::Idiff => {
             let names = [&arguments.a, &arguments.b].map(|p| p.display().to_string());
-            let report = compare::idiff::idiff(
+            let report = match compare::idiff::idiff(
                 [&names[0], &names[1]],
                 &a,
                 &b,
                 &thresholds(arguments),
                 options(arguments, talk),
-            )?;
+            ) {
+                Ok(report) => report,
+                Err(error) => {
+                    tell(&format!("idiff ERROR: {error}"));
+                    return Ok(UNREADABLE);
+                }
+            };
             print(&report.stdout)?;
             if !report.stderr.is_empty() {
                 tell(&report.stderr);

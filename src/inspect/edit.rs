@@ -26,7 +26,14 @@ impl Edit {
         let field = field(name.trim()).map_err(InspectError::Edit)?;
         let values: Vec<Value> =
             split(values).into_iter().map(value).collect::<Option<_>>().ok_or_else(malformed)?;
-        let is_color = matches!(field, MaterialField::BaseColor | MaterialField::EmissionColor);
+        let is_color = matches!(
+            field,
+            MaterialField::BaseColor
+                | MaterialField::EmissionColor
+                | MaterialField::TransmissionColor
+                | MaterialField::DiffTransColor
+                | MaterialField::Absorption
+        );
         let one_color = is_color && values.len() == 3 && values.iter().all(|v| matches!(v, Value::Number(_)));
         Ok(Self { field, values: if one_color { vec![Value::List(values)] } else { values } })
     }
@@ -81,7 +88,9 @@ mod tests {
     fn lists_are_variants_and_colours_are_one_value() {
         assert_eq!(values("roughness=0.1, 0.3"), [Value::Number(0.1), Value::Number(0.3)]);
         let red = Value::List([0.9, 0.1, 0.1].map(Value::Number).to_vec());
-        assert_eq!(values("color=0.9,0.1,0.1"), std::slice::from_ref(&red));
+        for color in ["color", "emission_color", "transmission_color", "diff_trans_color", "absorption"] {
+            assert_eq!(values(&format!("{color}=0.9,0.1,0.1")), std::slice::from_ref(&red), "{color}");
+        }
         assert_eq!(values("baseColor=[0.9, 0.1, 0.1], #aabbcc"), [red, Value::Text("#aabbcc".into())]);
         assert_eq!(values("model=mirror,disney").len(), 2);
         for wrong in ["roughness", "roughness=", "roughness=0.1,,0.2", "roughness=1999-01-01"] {

@@ -1,5 +1,7 @@
 //! The numbers of axes that are computed: ranges, random values, Sobol' points.
 
+use std::collections::HashSet;
+
 use super::model::{Distribution, Interval, Random, Sequence};
 use crate::math::Real;
 use crate::math::hash::{combine, mix64};
@@ -106,7 +108,19 @@ pub(super) fn random(random: Random) -> Result<Vec<f64>, Senseless> {
             Box::new(move |i| normal_within(random.seed, i, mean, sd, low..=high))
         }
     };
-    finite((0..random.count).map(|i| draw(i).map(|v| round_to(v, DRAWN_DIGITS))).collect::<Result<_, _>>()?)
+    let values: Vec<f64> = (0..random.count).map(draw).collect::<Result<_, _>>()?;
+    finite(told_apart(&values))
+}
+
+/// The values, rounded; of those that are the same then, the later ones less.
+fn told_apart(values: &[f64]) -> Vec<f64> {
+    const MOST_DIGITS: usize = 17;
+    let mut seen = HashSet::new();
+    let rounded = |value: &f64| {
+        let mut finer = (DRAWN_DIGITS..=MOST_DIGITS).map(|digits| round_to(*value, digits));
+        finer.find(|v| seen.insert(v.to_bits())).unwrap_or(*value)
+    };
+    values.iter().map(rounded).collect()
 }
 
 /// A normal variate inside `within`, by rejection (Box and Muller 1958).
@@ -210,7 +224,10 @@ mod tests {
         for distribution in [Distribution::Uniform, Distribution::LogUniform, Distribution::Normal] {
             let many = drawn(distribution, 1000);
             assert!(many.iter().all(|v| (0.1..=0.9).contains(v)));
-            assert_eq!(many[..10], drawn(distribution, 10), "a larger count keeps the first values");
+            let more = drawn(distribution, 5000);
+            assert_eq!(many, more[..1000], "a larger count keeps the first values");
+            let bits: HashSet<u64> = more.iter().map(|v| v.to_bits()).collect();
+            assert_eq!(bits.len(), 5000, "or two jobs would have one name");
         }
     }
 
