@@ -12,6 +12,7 @@ mod principled;
 mod report;
 mod rounding;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 pub use batch::{Input, inputs};
@@ -66,9 +67,9 @@ pub enum ExportError {
         limit: u64,
     },
     /// The result would take the place of what it is made of.
-    #[error("{} is the scene itself and would be overwritten; choose another folder", path.display())]
+    #[error("{} is the scene itself or belongs to it, and would be overwritten; choose another folder", path.display())]
     Itself {
-        /// The scene.
+        /// The file.
         path: PathBuf,
     },
     /// XML can't be written.
@@ -165,8 +166,10 @@ pub fn export(
             (vec![(gltf::FILE_NAME.to_owned(), glb.bytes)], gltf::FILE_NAME)
         }
     };
-    if is_same_file(&folder.join(main), source) {
-        return Err(ExportError::Itself { path: source.to_owned() });
+    let written = textures.names().chain(files.iter().map(|(file, _)| file.as_str()));
+    let read = imported.files.iter().map(|file| imported.folder.join(&file.name));
+    if let Some(path) = first_overwritten(written.map(|file| folder.join(file)), read) {
+        return Err(ExportError::Itself { path });
     }
     // What names others comes last: where it stands, they do.
     textures.save(folder)?;
@@ -202,7 +205,11 @@ fn write_in_folder(path: &Path, content: &[u8]) -> Result<(), ExportError> {
     Ok(write_whole(path, content)?)
 }
 
-/// Whether both names lead to one file that is there.
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+/// The first of the files to be `written` that is one of those that were `read`, whatever both are called.
+fn first_overwritten(
+    mut written: impl Iterator<Item = PathBuf>,
+    read: impl Iterator<Item = PathBuf>,
+) -> Option<PathBuf> {
+    let read: BTreeSet<PathBuf> = read.filter_map(|path| path.canonicalize().ok()).collect();
+    written.find(|path| path.canonicalize().is_ok_and(|path| read.contains(&path)))
 }

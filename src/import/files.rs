@@ -146,6 +146,11 @@ impl Files {
         self.reach
     }
 
+    /// The folder that names count from, without links.
+    pub(super) fn root(&self) -> &Path {
+        &self.root
+    }
+
     /// What was read so far, in order.
     pub fn into_digests(self) -> Vec<FileDigest> {
         self.read

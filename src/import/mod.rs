@@ -46,6 +46,8 @@ pub struct Imported {
     pub warnings: Vec<Warning>,
     /// Every file that was read, in order: the scene's identity.
     pub files: Vec<FileDigest>,
+    /// The folder that the names of `files` count from.
+    pub folder: PathBuf,
 }
 
 /// Why a scene could not be imported.
@@ -169,16 +171,16 @@ fn import_with(
         }
         None => Cow::Borrowed(bytes),
     };
-    let mut digests = None;
+    let mut of_config = None;
     let (mut scene, mut warnings) = match dialect {
         Dialect::Gltf => gltf::import(&mut files, name, &bytes, options)
             .map_err(|cause| ImportError::Gltf { path: path.to_owned(), cause: Box::new(cause) })?,
         Dialect::Obj => obj::import(&mut files, name, &bytes)?,
         Dialect::Aris => {
             // Its folder is the one that holds `config/`, above the scene's own, and so are its files.
-            let of_config = aris::import(path, options.reach).map_err(Box::new)?;
-            digests = Some(of_config.files);
-            (of_config.scene, of_config.warnings)
+            let imported = aris::import(path, options.reach).map_err(Box::new)?;
+            of_config = Some((imported.folder, imported.files));
+            (imported.scene, imported.warnings)
         }
     };
     let gltf_alone = options.variant.is_some() || options.animation.is_some() || options.time.is_some();
@@ -188,7 +190,8 @@ fn import_with(
     }
     validate::validate(&mut scene, name, &mut warnings)
         .map_err(|cause| ImportError::Invalid { path: path.to_owned(), cause })?;
-    Ok(Imported { scene, warnings, files: digests.unwrap_or_else(|| files.into_digests()) })
+    let (folder, files) = of_config.unwrap_or_else(|| (files.root().to_owned(), files.into_digests()));
+    Ok(Imported { scene, warnings, files, folder })
 }
 
 /// The kinds of files that are read.

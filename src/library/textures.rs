@@ -45,9 +45,14 @@ impl<'a> TextureFiles<'a> {
         file
     }
 
+    /// The files of those that are used, relative to the text.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.iter().flatten().map(String::as_str)
+    }
+
     /// How many are used.
     pub fn count(&self) -> usize {
-        self.files.iter().flatten().count()
+        self.names().count()
     }
 
     /// Writes those that are used into the folder of the text, `folder`; their own folder is made where it is missing.

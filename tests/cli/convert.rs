@@ -78,6 +78,33 @@ fn a_folder_is_converted_in_one_go_and_a_broken_file_does_not_stop_the_rest() {
     desk.run(["convert", "results", "-o", "out"]).ends_with(2);
 }
 
+#[test]
+fn a_scene_s_own_textures_and_configs_are_never_written_over() {
+    let desk = Desk::new("");
+    desk.run(["convert", &scene("spheres.glb"), "-o", "model"]).ends_with(0);
+    std::fs::remove_file(desk.path("model/materials.yaml")).unwrap();
+    let quad =
+        "mtllib quad.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl floor\nf 1/1 2/2 3/3\n";
+    std::fs::write(desk.path("model/quad.obj"), quad).unwrap();
+    std::fs::write(desk.path("model/quad.mtl"), "newmtl floor\nmap_Kd textures/chess.png\n").unwrap();
+    let files = ["model/textures/chess.png", "root/config/scene/cbox_balls.yaml"];
+    desk.run(["convert", &scene("aris/config/scene/cbox_balls.yaml"), "--to", "aris", "-o", "root"])
+        .ends_with(0);
+    let changed = |file| desk.path(file).metadata().unwrap().modified().unwrap();
+    let before = files.map(changed);
+    desk.run(["convert", "model/quad.obj", "-o", "model"])
+        .ends_with(2)
+        .tells("model/textures/chess.png is the scene itself or belongs to it");
+    desk.run(["convert", files[1], "--to", "aris", "-o", "root"]).ends_with(2).tells("would be overwritten");
+    assert_eq!(files.map(changed), before);
+    assert_eq!(
+        desk.names("model"),
+        ["quad.mtl", "quad.obj", "textures"],
+        "nothing is written before it is told"
+    );
+    desk.run(["convert", "model/quad.obj", "-o", "model/disney"]).ends_with(0).says("1 texture;");
+}
+
 /// MaterialX's own library knows every node, finds nothing wrong, and generates a shader of each material.
 #[test]
 fn materialx_reads_the_documents() {

@@ -197,7 +197,7 @@ pub(super) fn import(path: &Path, reach: Reach) -> Result<Imported, ArisError> {
     let composed = interpolate::resolve(&compose::compose(&mut files, top, name, &[])?)?;
     let mut warnings = Vec::new();
     let scene = scene::build(&mut files, &composed, &mut warnings)?;
-    Ok(Imported { scene, warnings, files: files.into_digests() })
+    Ok(Imported { scene, warnings, folder: root.to_owned(), files: files.into_digests() })
 }
 
 #[cfg(test)]

@@ -128,7 +128,8 @@ impl ArisConfig {
         let composed = blake3::hash(write::to_yaml(of_scene).as_bytes());
         let mut digests = vec![FileDigest { name: "scene".to_owned(), digest: composed }];
         digests.extend(files.into_digests());
-        Ok(ArisRun { imported: Imported { scene, warnings, files: digests }, settings, save_exr })
+        let imported = Imported { scene, warnings, files: digests, folder: self.folder.clone() };
+        Ok(ArisRun { imported, settings, save_exr })
     }
 }
 

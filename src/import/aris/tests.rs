@@ -51,7 +51,7 @@ fn aris<'a>(scene: &'a Scene<SourceMaterial>, name: &str) -> &'a ArisMaterial {
 
 #[test]
 fn a_scene_keeps_its_camera_to_the_letter() {
-    let Imported { scene, warnings, files } =
+    let Imported { scene, warnings, files, .. } =
         import_scene(&format!("{GEOMETRY}{BRDF}{CAMERA}"), &[]).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     let camera = &scene.cameras[0].item;
@@ -128,7 +128,7 @@ fn every_brdf_is_read() {
          - {{name: disney, config: {{color: [1, 0.4, 0.7], roughness: 0.2, metallic: 1, subsurface: 0, specular: 0.7, \
          specularTint: 0.1, anisotropic: 0.8, sheen: 0.6, sheenTint: 0.9, clearcoat: 1, clearcoatGloss: 0.5}}}}\n"
     );
-    let Imported { scene, warnings, files } = import_scene(&text, &[]).unwrap();
+    let Imported { scene, warnings, files, .. } = import_scene(&text, &[]).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     assert_eq!(scene.meshes.len(), 1, "the same mesh five times");
     assert_eq!(files.len(), 2, "and read once");
