@@ -65,13 +65,17 @@ fn is_scene(path: &Path) -> bool {
     name.rsplit_once('.').is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
 }
 
-/// A folder that nothing else has: two files may differ in their ending alone.
+/// A folder that nothing else has: two files may differ in their ending alone, or in the folders they were found in.
 fn own_folder(output: &Path, inside: &Path, taken: &mut BTreeSet<PathBuf>) -> PathBuf {
-    let stem = inside.with_extension("");
-    let mut folder = output.join(&stem);
-    if !taken.insert(folder.clone()) {
-        folder = output.join(inside);
-        taken.insert(folder.clone());
+    let mut folder = output.join(inside.with_extension(""));
+    let whole = output.join(inside);
+    let mut again = 1;
+    while !taken.insert(folder.clone()) {
+        folder = whole.clone();
+        if again > 1 {
+            folder.as_mut_os_string().push(format!("-{again}"));
+        }
+        again += 1;
     }
     folder
 }
@@ -91,6 +95,11 @@ mod tests {
         let found = inputs(&[root.path().to_owned()], Path::new("out")).unwrap();
         let folders: Vec<String> = found.iter().map(|i| i.folder.display().to_string()).collect();
         assert_eq!(folders, ["out/a", "out/a.obj", "out/c.obj", "out/sub/b"]);
+        let alike = ["x/a.glb", "y/a.glb", "z/a.glb", "w/a.glb"].map(PathBuf::from);
+        let folders: BTreeSet<PathBuf> =
+            inputs(&alike, Path::new("out")).unwrap().into_iter().map(|i| i.folder).collect();
+        let expected = ["out/a", "out/a.glb", "out/a.glb-2", "out/a.glb-3"].map(PathBuf::from);
+        assert_eq!(folders, BTreeSet::from(expected));
         let single = inputs(&[root.path().join("a.glb")], Path::new("out")).unwrap();
         assert_eq!(single[0].folder, Path::new("out"));
         let empty = tempfile::tempdir().unwrap();
