@@ -5,7 +5,7 @@
 use std::fmt::Write;
 
 use super::ExportError;
-use super::names::Identifiers;
+use super::names::{Identifiers, file_stem};
 use super::rounding::reads_back_as;
 use crate::color::Rgb;
 use crate::convert::{Note, Quality};
@@ -38,7 +38,7 @@ pub(super) fn root(scene: &Scene<Material>, name: &str) -> Result<Root, ExportEr
         .instances
         .iter()
         .map(|instance| {
-            let path = format!("data/meshes/{id}/{}.obj", names.of(&instance.name));
+            let path = format!("data/meshes/{id}/{}.obj", names.of(&file_stem(&instance.name)));
             writer.files.push((path.clone(), obj(scene, instance)));
             path
         })
@@ -298,4 +298,32 @@ fn degrees(radians: f32) -> f32 {
 
 fn rgb(c: Rgb) -> String {
     format!("[{}, {}, {}]", c.r, c.g, c.b)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::convert::{ConvertOptions, to_disney};
+    use crate::import::{ImportOptions, import};
+
+    fn room() -> Scene<Material> {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.obj");
+        let imported = import(&file, &ImportOptions::default()).unwrap();
+        to_disney(imported.scene, &ConvertOptions::default()).scene
+    }
+
+    #[test]
+    fn meshes_have_files_of_their_own_on_every_file_system() {
+        let mut scene = room();
+        let long = "x".repeat(300);
+        for (instance, name) in scene.instances.iter_mut().zip([&long, "Ball", "ball"]) {
+            instance.name = name.into();
+        }
+        let files = root(&scene, "room").unwrap().files;
+        let meshes: Vec<&str> = files.iter().take(3).map(|(path, _)| path.as_str()).collect();
+        let expected = [&long[..100], "ball", "ball_2"].map(|name| format!("data/meshes/room/{name}.obj"));
+        assert_eq!(meshes, expected);
+    }
 }

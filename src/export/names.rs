@@ -1,11 +1,11 @@
 //! Names that other formats take: identifiers, each once.
 
-use std::collections::BTreeSet;
+use crate::library::TakenNames;
 
 /// Identifiers for the names of a scene.
 #[derive(Debug, Default)]
 pub(super) struct Identifiers {
-    taken: BTreeSet<String>,
+    taken: TakenNames,
 }
 
 impl Identifiers {
@@ -16,14 +16,13 @@ impl Identifiers {
         if identifier.is_empty() || identifier.starts_with(|c: char| c.is_ascii_digit()) {
             identifier.insert(0, '_');
         }
-        let mut candidate = identifier.clone();
-        let mut again = 2;
-        while !self.taken.insert(candidate.clone()) {
-            candidate = format!("{identifier}_{again}");
-            again += 1;
-        }
-        candidate
+        self.taken.take(identifier.clone(), |number| format!("{identifier}_{number}"))
     }
+}
+
+/// What of a name becomes a file's: not every file system tells cases apart or takes any length.
+pub(super) fn file_stem(name: &str) -> String {
+    name.to_lowercase().chars().take(100).collect()
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ mod field;
 mod keys;
 mod overlay;
 mod read;
+mod taken;
 #[cfg(test)]
 mod tests;
 mod textures;
@@ -28,6 +29,7 @@ mod write;
 pub use field::field;
 pub use keys::of as aris_key;
 pub use read::Library;
+pub use taken::TakenNames;
 pub use textures::TextureFiles;
 pub use write::{FILE_NAME, Written, write};
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::TakenNames;
 use crate::imagefile::{ImageFileError, Interleaved, encode_texture, write_whole};
 use crate::manifest::names::plain_name;
 use crate::scene::texture::{Image, Pixels};
@@ -17,12 +18,13 @@ pub struct TextureFiles<'a> {
     images: &'a [Arc<Image>],
     /// By image, relative to the text.
     files: Vec<Option<String>>,
+    taken: TakenNames,
 }
 
 impl<'a> TextureFiles<'a> {
     /// Of a scene, none of them used.
     pub fn new<M>(scene: &'a Scene<M>) -> Self {
-        Self { images: &scene.images, files: vec![None; scene.images.len()] }
+        Self { images: &scene.images, files: vec![None; scene.images.len()], taken: TakenNames::default() }
     }
 
     /// The file of an image, named after it: PNG for integers, EXR for floats. It will be written.
@@ -35,12 +37,9 @@ impl<'a> TextureFiles<'a> {
         let stem = Path::new(&image.name).file_stem().map_or("image".into(), |s| s.to_string_lossy());
         let stem = plain_name(&stem);
         let extension = if matches!(image.pixels, Pixels::F32(_)) { "exr" } else { "png" };
-        let mut file = format!("{FOLDER}/{stem}.{extension}");
-        let mut again = 2;
-        while self.files.iter().flatten().any(|f| f.eq_ignore_ascii_case(&file)) {
-            file = format!("{FOLDER}/{stem}-{again}.{extension}");
-            again += 1;
-        }
+        let file = self.taken.take(format!("{FOLDER}/{stem}.{extension}"), |number| {
+            format!("{FOLDER}/{stem}-{number}.{extension}")
+        });
         self.files[index] = Some(file.clone());
         file
     }

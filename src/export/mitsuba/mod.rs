@@ -16,7 +16,7 @@ use mesh::Placed;
 use texture::Textures;
 
 use super::ExportError;
-use super::names::Identifiers;
+use super::names::{Identifiers, file_stem};
 use crate::convert::{Note, Quality};
 use crate::render::image_size;
 use crate::scene::environment::EnvironmentMap;
@@ -154,11 +154,6 @@ fn shapes(bsdfs: &mut Bsdfs<'_, '_>, ids: &[String], files: &mut Vec<(String, Ve
         }
     }
     shapes
-}
-
-/// What of a name becomes a file's: not every file system tells cases apart or takes any length.
-fn file_stem(name: &str) -> String {
-    name.to_lowercase().chars().take(100).collect()
 }
 
 /// The instances that have triangles, those of the same mesh and material together.

@@ -5,9 +5,8 @@ use std::path::Path;
 use glam::{Affine2, Affine3A, Mat3A, Vec3A};
 
 use super::element::Element;
-use super::file_stem;
 use crate::color::Rgb;
-use crate::export::names::Identifiers;
+use crate::export::names::{Identifiers, file_stem};
 use crate::imagefile::{ImageFileError, Interleaved, encode_texture};
 use crate::scene::material::{TextureChannel, TextureMap};
 use crate::scene::texture::{Encoding, Image, Pixels, Texel, TexelFilter, Texture, Wrap};
