@@ -49,14 +49,31 @@ pub(super) fn document(
     let mut notes = Vec::new();
     let root = [("version", "1.39"), ("colorspace", "lin_rec709")];
     writer.create_element("materialx").with_attributes(root).write_inner_content(|writer| {
-        for Named { name, item } in &scene.materials {
+        // Materials first: they keep their names, and what belongs to them makes way.
+        let ids: Vec<String> = scene.materials.iter().map(|m| names.of(&m.name)).collect();
+        for (Named { name, item }, id) in scene.materials.iter().zip(ids) {
             let mut material = MaterialWriter { scene, files, writer, notes: &mut notes, name };
-            material.write(&names.of(name), item)?;
+            material.write(&Nodes::of(id, &mut names), item)?;
         }
         Ok(())
     })?;
     let text = String::from_utf8(writer.into_inner()).map_err(std::io::Error::other)?;
     Ok(Document { text: text + "\n", notes })
+}
+
+/// What a material's nodes are called.
+struct Nodes {
+    material: String,
+    shader: String,
+    textures: String,
+}
+
+impl Nodes {
+    fn of(material: String, names: &mut Identifiers) -> Self {
+        let shader = names.of(&format!("{material}_shader"));
+        let textures = names.of(&format!("{material}_textures"));
+        Self { material, shader, textures }
+    }
 }
 
 struct MaterialWriter<'w, 'f, 's> {
@@ -79,7 +96,7 @@ impl MaterialWriter<'_, '_, '_> {
         self.notes.push(Note { material, field, quality, reason: reason.to_owned() });
     }
 
-    fn write(&mut self, id: &str, material: &Material) -> std::io::Result<()> {
+    fn write(&mut self, nodes: &Nodes, material: &Material) -> std::io::Result<()> {
         let flat = principled(material);
         let mut inputs = vec![("baseColor", Input::Color(&flat.base_color))];
         inputs.extend(INPUTS.map(|(parameter, name)| (name, Input::Float(flat.scalar(parameter)))));
@@ -87,10 +104,9 @@ impl MaterialWriter<'_, '_, '_> {
         let textured: Vec<_> =
             inputs.iter().filter_map(|(name, input)| Some((*name, input.map()?, input))).collect();
         if !textured.is_empty() {
-            self.graph(id, &textured)?;
+            self.graph(&nodes.textures, &textured)?;
         }
-        let shader = format!("{id}_shader");
-        let attributes = [("name", shader.as_str()), ("type", "surfaceshader")];
+        let attributes = [("name", nodes.shader.as_str()), ("type", "surfaceshader")];
         self.writer.create_element("disney_principled").with_attributes(attributes).write_inner_content(
             |writer| {
                 for (name, input) in &inputs {
@@ -100,7 +116,7 @@ impl MaterialWriter<'_, '_, '_> {
                     match input.constant() {
                         Some(value) => element.with_attribute(("value", value.as_str())).write_empty()?,
                         None => element
-                            .with_attribute(("nodegraph", graph_name(id).as_str()))
+                            .with_attribute(("nodegraph", nodes.textures.as_str()))
                             .with_attribute(("output", format!("{name}_out").as_str()))
                             .write_empty()?,
                     };
@@ -108,11 +124,14 @@ impl MaterialWriter<'_, '_, '_> {
                 Ok(())
             },
         )?;
-        let attributes = [("name", id), ("type", "material")];
+        let attributes = [("name", nodes.material.as_str()), ("type", "material")];
         self.writer.create_element("surfacematerial").with_attributes(attributes).write_inner_content(
             |writer| {
-                let input =
-                    [("name", "surfaceshader"), ("type", "surfaceshader"), ("nodename", shader.as_str())];
+                let input = [
+                    ("name", "surfaceshader"),
+                    ("type", "surfaceshader"),
+                    ("nodename", nodes.shader.as_str()),
+                ];
                 writer.create_element("input").with_attributes(input).write_empty()?;
                 Ok(())
             },
@@ -121,8 +140,8 @@ impl MaterialWriter<'_, '_, '_> {
         Ok(())
     }
 
-    /// The nodes that read textures, as a graph with an output for each input of the shader.
-    fn graph(&mut self, id: &str, textured: &[(&str, &TextureMap, &Input<'_>)]) -> std::io::Result<()> {
+    /// The nodes that read textures, as the graph `graph` with an output for each input of the shader.
+    fn graph(&mut self, graph: &str, textured: &[(&str, &TextureMap, &Input<'_>)]) -> std::io::Result<()> {
         let mut nodes = Vec::new();
         for (name, map, input) in textured {
             if map.texture_from_uv != glam::Affine2::IDENTITY {
@@ -131,9 +150,7 @@ impl MaterialWriter<'_, '_, '_> {
             let texture = &self.scene.textures[map.texture.0 as usize];
             nodes.push((*name, *map, *input, texture, self.files.of(texture.image)));
         }
-        let attributes = [("name", graph_name(id))];
-        let attributes = attributes.iter().map(|(k, v)| (*k, v.as_str()));
-        self.writer.create_element("nodegraph").with_attributes(attributes).write_inner_content(
+        self.writer.create_element("nodegraph").with_attribute(("name", graph)).write_inner_content(
             |writer| {
                 for (name, map, input, texture, file) in &nodes {
                     let image = format!("{name}_image");
@@ -261,10 +278,6 @@ impl Input<'_> {
     }
 }
 
-fn graph_name(id: &str) -> String {
-    format!("{id}_textures")
-}
-
 fn rgb(c: Rgb) -> String {
     format!("{}, {}, {}", c.r, c.g, c.b)
 }
@@ -318,4 +331,31 @@ fn scaled(
         Ok(())
     })?;
     Ok(product)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn no_two_nodes_share_a_name_and_every_material_has_its_own_shader() {
+        let mut scene = Scene::empty();
+        for name in ["a", "a_shader", "a_textures", "A"] {
+            scene.materials.push(Named::new(name, Material::default()));
+        }
+        let text = document(&scene, &mut TextureFiles::new(&scene)).unwrap().text;
+        let named = |element: &str| -> Vec<&str> {
+            let start = format!("<{element} name=\"");
+            text.split(&start).skip(1).filter_map(|rest| rest.split('"').next()).collect()
+        };
+        let (materials, shaders) = (named("surfacematerial"), named("disney_principled"));
+        assert_eq!(materials, ["a", "a_shader", "a_textures", "A_2"]);
+        let names: BTreeSet<&str> = materials.iter().chain(&shaders).copied().collect();
+        assert_eq!(names.len(), 8, "{names:?}");
+        for (shader, used) in shaders.iter().zip(text.split("nodename=\"").skip(1)) {
+            assert_eq!(used.split('"').next(), Some(*shader));
+        }
+    }
 }
