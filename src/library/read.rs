@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::LibraryError;
-use crate::import::yaml::{self, Node, Place};
+use crate::disney::Model;
+use crate::import::yaml::{self, Node, Place, Value};
 use crate::import::{FileDigest, Files, Reach};
 use crate::record::Warning;
 use crate::scene::{Material, Named, Scene};
@@ -69,26 +70,29 @@ impl Library {
 pub(super) fn entries(name: &str, bytes: &[u8]) -> Result<Option<Vec<Entry>>, LibraryError> {
     let root = yaml::parse(name, bytes).map_err(Box::new)?;
     let place = root.place.clone();
-    let yaml::Value::Map(top) = root.value else {
+    let Value::Map(top) = root.value else {
         return Err(form(&place, "a map from names to materials is expected"));
     };
-    if top.iter().any(|(key, ..)| SCENE_KEYS.contains(&key.as_str())) {
-        return Ok(None);
-    }
     if top.is_empty() {
         return Err(form(&place, "the library has no materials"));
     }
-    let is_field = |node: &Node| match &node.value {
-        yaml::Value::Map(fields) => fields.iter().any(|(key, ..)| key == super::keys::FILE),
-        _ => true,
-    };
-    if top.iter().all(|(key, _, node)| key == CONFIG || is_field(node)) {
-        let stem = Path::new(name).file_stem().map_or(name.into(), |s| s.to_string_lossy());
-        return Ok(Some(vec![entry(stem.into_owned(), place, top)?]));
+    // Materials may be called as anything else is.
+    if !top.iter().all(|(.., node)| says_its_model(node)) {
+        if top.iter().any(|(key, ..)| SCENE_KEYS.contains(&key.as_str())) {
+            return Ok(None);
+        }
+        let is_field = |node: &Node| match &node.value {
+            Value::Map(fields) => fields.iter().any(|(key, ..)| key == super::keys::FILE),
+            _ => true,
+        };
+        if top.iter().all(|(key, _, node)| key == CONFIG || is_field(node)) {
+            let stem = Path::new(name).file_stem().map_or(name.into(), |s| s.to_string_lossy());
+            return Ok(Some(vec![entry(stem.into_owned(), place, top)?]));
+        }
     }
     top.into_iter()
         .map(|(key, place, node)| match node.value {
-            yaml::Value::Map(fields) => entry(key, place, fields),
+            Value::Map(fields) => entry(key, place, fields),
             _ => Err(form(&node.place, "a map of fields is expected, such as {roughness: 0.3}")),
         })
         .collect::<Result<_, _>>()
@@ -99,12 +103,21 @@ pub(super) fn entries(name: &str, bytes: &[u8]) -> Result<Option<Vec<Entry>>, Li
 const CONFIG: &str = "config";
 const NAME: &str = "name";
 
+/// Whether this is an entry in Aris' shape, as libraries are written: no part of a scene has the name of a model.
+fn says_its_model(node: &Node) -> bool {
+    let is_model = |value: &Value| matches!(value, Value::Text(name) if Model::from_name(name).is_some());
+    match &node.value {
+        Value::Map(fields) => fields.iter().any(|(key, _, node)| key == NAME && is_model(&node.value)),
+        _ => false,
+    }
+}
+
 /// An entry of `fields`, those under `config` taken for its own.
 fn entry(name: String, place: Place, fields: Vec<(String, Place, Node)>) -> Result<Entry, LibraryError> {
     let mut flat = Vec::with_capacity(fields.len());
     for (key, at, node) in fields {
         match (key.as_str(), node.value) {
-            (CONFIG, yaml::Value::Map(inner)) => flat.extend(inner),
+            (CONFIG, Value::Map(inner)) => flat.extend(inner),
             (CONFIG, _) => return Err(form(&node.place, "config is a map of fields")),
             (NAME, value) => flat.push(("model".to_owned(), at, Node { place: node.place, value })),
             (_, value) => flat.push((key, at, Node { place: node.place, value })),

@@ -65,6 +65,17 @@ fn an_aris_scene_is_no_library() {
 }
 
 #[test]
+fn written_materials_come_back_whatever_they_are_called() {
+    let names = ["camera", "geometry", "brdf", "emitters", "defaults", "config", "file", "name"];
+    for some in names.map(|name| vec![name]).into_iter().chain([names.to_vec()]) {
+        let mut scene = Scene::empty();
+        scene.materials = some.iter().map(|name| Named::new(*name, Material::default())).collect();
+        let read = library(&write(&scene, "x.glb").text).unwrap();
+        assert_eq!(read.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), some);
+    }
+}
+
+#[test]
 fn a_material_that_the_scene_lacks_is_told_with_the_nearest() {
     let mut scene = Scene::empty();
     scene.materials.push(Named::new("ball", Material::default()));
