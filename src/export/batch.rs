@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 use super::ExportError;
+use crate::import::is_aris_scene;
 
 /// A scene to convert.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,10 +17,13 @@ pub struct Input {
     pub folder: PathBuf,
 }
 
-const ENDINGS: [&str; 5] = ["gltf", "glb", "obj", "yaml", "yml"];
+const ENDINGS: [&str; 3] = ["gltf", "glb", "obj"];
+/// Of files that may be anything else as well.
+const YAML_ENDINGS: [&str; 2] = ["yaml", "yml"];
 
-/// The scenes that `paths` name, files as they are and folders with all scenes inside them, in alphabetical order. Each has a folder under
-/// `output` after its path within the folder it was found in; a single file has `output` itself.
+/// The scenes that `paths` name, files as they are and folders with all scenes inside them, in alphabetical order; other YAML in
+/// folders is passed over. Each has a folder under `output` after its path within the folder it was found in; a single file has
+/// `output` itself.
 ///
 /// # Errors
 /// If a folder can't be looked into or has no scene.
@@ -61,8 +65,11 @@ fn scenes_in(folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
 
 fn is_scene(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let name = [".gz", ".zst"].iter().find_map(|packing| name.strip_suffix(packing)).unwrap_or(&name);
-    name.rsplit_once('.').is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
+    let unpacked = [".gz", ".zst"].iter().find_map(|packing| name.strip_suffix(packing)).unwrap_or(&name);
+    unpacked.rsplit_once('.').is_some_and(|(stem, ending)| {
+        let is_yaml = YAML_ENDINGS.contains(&ending) && unpacked == name;
+        !stem.is_empty() && (ENDINGS.contains(&ending) || is_yaml && is_aris_scene(path))
+    })
 }
 
 /// A folder that nothing else has: two files may differ in their ending alone, or in the folders they were found in.
@@ -83,6 +90,31 @@ fn own_folder(output: &Path, inside: &Path, taken: &mut BTreeSet<PathBuf>) -> Pa
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_the_yaml_in_folders_scenes_alone_are_taken() {
+        let root = tempfile::tempdir().unwrap();
+        let scene = "geometry: {}\nbrdf: []\ncamera: {}\n";
+        for (file, text) in [
+            ("broken.yaml", "defaults: [lost]\n"),
+            ("half.yaml", "geometry: {}\n"),
+            ("library.yaml", "gold: {name: disney, config: {}}\n"),
+            ("list.yaml", "- 1\n"),
+            ("other.yml", "defaults: {run: {shell: bash}}\n"),
+            ("packed.yaml.gz", scene),
+            ("scene.yaml", scene),
+            ("whole.YML", "defaults: [half, rest]\n"),
+            ("rest.yaml", "brdf: []\ncamera: {}\n"),
+            ("wrong.yaml", "{"),
+        ] {
+            std::fs::write(root.path().join(file), text).unwrap();
+        }
+        let found = inputs(&[root.path().to_owned()], Path::new("out")).unwrap();
+        let names: Vec<_> = found.iter().filter_map(|i| i.source.file_name()).collect();
+        assert_eq!(names, ["broken.yaml", "scene.yaml", "whole.YML"]);
+        let named = ["half.yaml", "wrong.yaml"].map(|file| root.path().join(file));
+        assert_eq!(inputs(&named, Path::new("out")).unwrap().len(), 2, "what is named is taken");
+    }
 
     #[test]
     fn folders_are_walked_and_every_scene_has_a_folder_of_its_own() {

@@ -15,8 +15,8 @@ use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-pub(crate) use aris::yaml;
 pub use aris::{ArisConfig, ArisError, ArisRun};
+pub(crate) use aris::{is_scene as is_aris_scene, yaml};
 pub use files::{FileDigest, FileError, Files};
 pub use gltf::{GltfError, UriProblem};
 pub use images::{EnvironmentError, Images, read_environment, read_image};

@@ -78,6 +78,15 @@ fn a_folder_is_converted_in_one_go_and_a_broken_file_does_not_stop_the_rest() {
     desk.run(["convert", "results", "-o", "out"]).ends_with(2);
 }
 
+/// Its groups, its base and the config of a render are no scenes.
+#[test]
+fn of_a_config_root_its_scenes_are_converted() {
+    let desk = Desk::new("");
+    desk.run(["convert", &scene("aris"), "-o", "out"]).ends_with(0);
+    assert_eq!(desk.names("out/config"), ["scene"]);
+    assert_eq!(desk.names("out/config/scene"), ["cbox", "cbox_balls", "cbox_copper", "cbox_diffuse"]);
+}
+
 #[test]
 fn a_scene_s_own_textures_and_configs_are_never_written_over() {
     let desk = Desk::new("");

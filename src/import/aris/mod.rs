@@ -20,6 +20,7 @@ pub(crate) mod yaml;
 use std::path::Path;
 
 pub use root::{ArisConfig, ArisRun};
+use yaml::{Node, Value};
 
 use super::{FileError, Files, Imported, ObjError, Reach};
 use crate::imagefile::ImageFileError;
@@ -177,6 +178,38 @@ pub enum ArisError {
 /// # Errors
 /// If a file is missing or cannot be read, a key is unknown or missing, or a value is of the wrong kind or out of range.
 pub(super) fn import(path: &Path, reach: Reach) -> Result<Imported, ArisError> {
+    let (mut files, composed) = composed(path, reach)?;
+    let composed = interpolate::resolve(&composed)?;
+    let mut warnings = Vec::new();
+    let scene = scene::build(&mut files, &composed, &mut warnings)?;
+    Ok(Imported { scene, warnings, folder: files.root().to_owned(), files: files.into_digests() })
+}
+
+/// Whether the YAML at `path` is a scene: with what its `defaults` name it has all that a scene needs. Groups, bases of scenes and
+/// configs of whole renders are none, nor is what others write in YAML. Where its `defaults` can't be followed it counts as one: who
+/// imports it is told why.
+pub(crate) fn is_scene(path: &Path) -> bool {
+    let has = |node: &Node, key: &str| edit::find(node, &[key]).is_some();
+    let Some(own) = small_yaml(path) else { return false };
+    let has_defaults = matches!(edit::find(&own, &["defaults"]), Some(Node { value: Value::List(_), .. }));
+    if !has_defaults && !has(&own, "geometry") {
+        return false;
+    }
+    match composed(path, Reach::Folder) {
+        Ok((_, composed)) => scene::NEEDED.iter().all(|key| has(&composed, key)),
+        Err(_) => true,
+    }
+}
+
+/// What a file holds, if it is YAML and no larger than a configuration may be.
+fn small_yaml(path: &Path) -> Option<Node> {
+    let size = path.metadata().ok()?.len();
+    let bytes = (size <= yaml::MAX_BYTES as u64).then(|| std::fs::read(path).ok())??;
+    yaml::parse(&path.display().to_string(), &bytes).ok()
+}
+
+/// The file at `path` with all that its `defaults` name, and the files of its scene.
+fn composed(path: &Path, reach: Reach) -> Result<(Files, Node), ArisError> {
     let failed = |cause| ArisError::Scene { path: path.display().to_string(), cause };
     let absolute =
         path.canonicalize().map_err(|cause| failed(FileError::Read { path: path.into(), cause }))?;
@@ -194,10 +227,8 @@ pub(super) fn import(path: &Path, reach: Reach) -> Result<Imported, ArisError> {
         Some(name) if config.is_some() => ("config", name),
         _ => ("", name.as_str()),
     };
-    let composed = interpolate::resolve(&compose::compose(&mut files, top, name, &[])?)?;
-    let mut warnings = Vec::new();
-    let scene = scene::build(&mut files, &composed, &mut warnings)?;
-    Ok(Imported { scene, warnings, folder: root.to_owned(), files: files.into_digests() })
+    let composed = compose::compose(&mut files, top, name, &[])?;
+    Ok((files, composed))
 }
 
 #[cfg(test)]

@@ -24,6 +24,9 @@ const COPIED_PER_BYTE: u64 = 64;
 /// The largest picture's side.
 const MAX_SIDE: u32 = 65_536;
 
+/// The keys that no scene goes without.
+pub(super) const NEEDED: [&str; 3] = ["geometry", "brdf", "camera"];
+
 /// The scene that `config` describes.
 pub(super) fn build(
     files: &mut Files,

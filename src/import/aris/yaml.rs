@@ -9,7 +9,7 @@ use serde_saphyr::Spanned;
 use super::ArisError;
 
 /// The largest file, in bytes. Scenes are a few kilobytes; numbers live in meshes and images.
-const MAX_BYTES: usize = 1 << 20;
+pub(super) const MAX_BYTES: usize = 1 << 20;
 
 /// A value with its place.
 #[derive(Clone, Debug)]
