@@ -11,7 +11,7 @@ use crate::color::Rgb;
 use crate::convert::{Note, Quality};
 use crate::disney::{BASE_COLOR, DiffuseModel, Masking, Model, Parameter};
 use crate::math::Real;
-use crate::scene::camera::{Aperture, FovAxis, Projection};
+use crate::scene::camera::{Aperture, FovAxis, Lens, Projection};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::material::{Material, Param, Sides};
 use crate::scene::{Camera, Instance, Named, Scene, framing};
@@ -173,9 +173,9 @@ impl RootWriter<'_> {
             None => ("perspective", String::new()),
             Some(lens) => {
                 if lens.shape == Aperture::Disk {
-                    self.note("", "lens", Quality::Approximated, "Aris' lens is a square");
+                    self.note("", "lens", Quality::Approximated, "a square of the disk's area");
                 }
-                let (aperture, distance) = (lens.radius, lens.focal_distance);
+                let (aperture, distance) = (half_side(lens), lens.focal_distance);
                 ("thin", format!("    aperture: {aperture}\n    focal_distance: {distance}\n"))
             }
         };
@@ -255,6 +255,14 @@ impl RootWriter<'_> {
     }
 }
 
+/// Half the side of the square that has the lens' area.
+fn half_side(lens: Lens) -> f32 {
+    match lens.shape {
+        Aperture::Disk => lens.radius * std::f32::consts::PI.sqrt() / 2.0,
+        Aperture::Square => lens.radius,
+    }
+}
+
 /// An instance's triangles in the world, with normals and texture coordinates.
 fn obj(scene: &Scene<Material>, instance: &Instance) -> String {
     let mesh = &scene.meshes[instance.mesh.0 as usize];
@@ -312,6 +320,20 @@ mod tests {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.obj");
         let imported = import(&file, &ImportOptions::default()).unwrap();
         to_disney(imported.scene, &ConvertOptions::default()).scene
+    }
+
+    #[test]
+    fn a_lens_keeps_its_area() {
+        let half_side = |shape| half_side(Lens { radius: 0.3, focal_distance: 5.0, shape });
+        assert_eq!(half_side(Aperture::Square), 0.3);
+        let side = 2.0 * half_side(Aperture::Disk);
+        assert!((side * side / (std::f32::consts::PI * 0.09) - 1.0).abs() < 1e-6);
+        let mut scene = room();
+        let mut camera = framing::frame(&scene);
+        camera.lens = Some(Lens { radius: 2.0, focal_distance: 5.0, shape: Aperture::Disk });
+        scene.cameras = vec![Named::new("camera", camera)];
+        let files = root(&scene, "room").unwrap().files;
+        assert!(files.iter().any(|(_, text)| text.contains("aperture: 1.772453")));
     }
 
     #[test]
