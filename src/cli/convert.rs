@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::reading::{Conversion, Reading};
-use super::{FAILED, Outcome, Talk, WELL, print, tell};
+use super::{FAILED, Outcome, Talk, WELL, print, tell, terminal_width};
 use crate::convert::ConvertOptions;
 use crate::export::{self, Exported, Input, Target, export};
 use crate::import::ImportOptions;
@@ -111,7 +111,7 @@ fn convert_all(
 }
 
 fn report(exported: &[Exported], report: Report) -> Result<String, Box<dyn std::error::Error>> {
-    let width = terminal_size::terminal_size().map(|(width, _)| width.0);
+    let width = terminal_width();
     Ok(match report {
         Report::Table => exported.iter().map(|e| export::table(e, width)).collect::<Vec<_>>().join("\n"),
         Report::Json => format!("{:#}\n", export::json(exported)),

@@ -160,6 +160,11 @@ fn print_bytes(bytes: &[u8]) -> Result<(), std::io::Error> {
     }
 }
 
+/// The width of the terminal that stdout is; none for a file or a pipe.
+fn terminal_width() -> Option<u16> {
+    terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| width.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

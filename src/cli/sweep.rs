@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::progress::Progress;
-use super::{Allowed, DIFFERENT, FAILED, Outcome, Talk, WELL, print};
+use super::{Allowed, DIFFERENT, FAILED, Outcome, Talk, WELL, print, terminal_width};
 use crate::record::{Job, JobRecord, Outcome as JobOutcome, Verdict};
 use crate::render::Control;
 use crate::report::{TableOptions, verdict_table};
@@ -140,11 +140,6 @@ fn described(sweep: &Sweep, jobs: &[&Job]) -> String {
         );
     }
     text + &format!("{} jobs into {}\n", jobs.len(), sweep.folder.display())
-}
-
-/// The width of the terminal that stdout is; none for a file or a pipe.
-fn terminal_width() -> Option<u16> {
-    terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| width.0)
 }
 
 struct Watcher {
