@@ -11,6 +11,7 @@ use super::Prepared;
 use super::adaptive::{Plan, Sight};
 use super::integrators::integrate;
 use super::light_image::LightImage;
+use super::pace::Pace;
 use super::path::PathSample;
 use super::replay::ReplayVertex;
 use super::tile::{Block, Level, NAMED_BAD_SAMPLES, Pixel, Tile, levels};
@@ -71,14 +72,13 @@ fn sampled(variants: &Variants<'_>, control: &Control) -> (Vec<Vec<Tile>>, Vec<L
         Tile::all(first).into_iter().map(|tile| vec![tile; scenes.len()]).collect();
     let mut lit: Vec<LightImage> = scenes.iter().map(|scene| LightImage::new(scene)).collect();
     let (mut sights, mut plans): (Vec<Sight>, Vec<Plan>) = (Vec::new(), Vec::new());
-    // One beyond all clocks never comes.
-    let deadline = control.time_limit.and_then(|limit| Instant::now().checked_add(limit));
-    for level in levels(first, control.time_limit.is_some()) {
-        // Every tile gets its first samples, also after the deadline: a picture has no holes.
-        let is_late = || deadline.is_some_and(|deadline| Instant::now() >= deadline);
-        if is_late() && stacks.iter().flatten().all(|tile| tile.samples > 0) {
-            break;
-        }
+    let mut pace = Pace::new(control.time_limit);
+    let mut levels = levels(first, control.time_limit.is_some()).into_iter().peekable();
+    let mut reached = 0;
+    while let Some(&next) = levels.peek() {
+        let start = Instant::now();
+        let going = stacks.iter().flatten().filter(|tile| !tile.is_finished).count();
+        let Some(level) = pace.reachable(next, reached, going) else { break };
         if let Some(aim) = level.aim {
             plans = sights.iter().map(|sight| Plan::new(sight, aim)).collect();
         }
@@ -94,7 +94,8 @@ fn sampled(variants: &Variants<'_>, control: &Control) -> (Vec<Vec<Tile>>, Vec<L
         }
         // One by one: rayon would leave a run of tiles to one thread while the others are done.
         stacks.par_iter_mut().with_max_len(1).for_each(|stack| {
-            let ends = is_late() && stack.iter().all(|tile| tile.samples > 0);
+            // Every tile gets its first samples, also after the deadline: a picture has no holes.
+            let ends = pace.is_over() && stack.iter().all(|tile| tile.samples > 0);
             if !ends {
                 sample_up_to(variants, stack, level, &plans, &lit, control);
             }
@@ -104,6 +105,9 @@ fn sampled(variants: &Variants<'_>, control: &Control) -> (Vec<Vec<Tile>>, Vec<L
             let seen = |variant: usize, lit| stacks.iter().flat_map(move |stack| stack[variant].seen(lit));
             sights = (0..).zip(&lit).map(|(variant, lit)| Sight::new(size, seen(variant, lit))).collect();
         }
+        pace.took(level.samples - reached, going, start);
+        reached = level.samples;
+        levels.next_if_eq(&level);
     }
     (stacks, lit)
 }

@@ -17,6 +17,7 @@ mod material;
 mod medium;
 mod mis;
 mod offset;
+mod pace;
 mod path;
 mod pilot;
 mod prepare;

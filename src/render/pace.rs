@@ -1,0 +1,100 @@
+//! How many samples a limit of time leaves room for: the last ones are as many as all tiles get in what is left of it, so that none has
+//! half as many as the others when it ends.
+
+use std::time::{Duration, Instant};
+
+use super::adaptive::Aim;
+use super::tile::Level;
+
+/// This part of the time that is left is counted on.
+const COUNTED_ON: f64 = 0.97;
+/// Pixels go on for no less than this part of the samples they have: each round costs something too.
+const LEAST_GAIN: f64 = 1.0 / 16.0;
+
+/// The time a render has, and how fast its samples come.
+pub(super) struct Pace {
+    deadline: Option<Instant>,
+    /// Seconds for a sample of each pixel of a tile, all threads together; none before the first.
+    seconds: Option<f64>,
+}
+
+impl Pace {
+    /// From now on.
+    pub(super) fn new(limit: Option<Duration>) -> Self {
+        // A deadline beyond all clocks never comes.
+        Self { deadline: limit.and_then(|limit| Instant::now().checked_add(limit)), seconds: None }
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+
+    /// What of the `level` so many tiles whose pixels have `before` samples can reach in time, if it is worth it; the first is always gone for.
+    pub(super) fn reachable(&self, level: Level, before: u32, tiles: usize) -> Option<Level> {
+        let (Some(deadline), Some(seconds)) = (self.deadline, self.seconds) else { return Some(level) };
+        let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
+        cut(level, before, COUNTED_ON * left / (seconds * tiles as f64))
+    }
+
+    /// So many tiles have got so many samples since `start`.
+    pub(super) fn took(&mut self, samples: u32, tiles: usize, start: Instant) {
+        let count = f64::from(samples) * tiles as f64;
+        if count > 0.0 {
+            self.seconds = Some(start.elapsed().as_secs_f64() / count);
+        }
+    }
+}
+
+/// The level, or as much of it as `more` samples reach, if that is worth it.
+fn cut(level: Level, before: u32, more: f64) -> Option<Level> {
+    if f64::from(before) + more >= f64::from(level.samples) {
+        return Some(level);
+    }
+    let samples = before + more as u32;
+    let is_worth_it = samples > before && more >= LEAST_GAIN * f64::from(before);
+    let aim = level.aim.map(|aim| Aim { mean: samples, ..aim });
+    is_worth_it.then_some(Level { samples, aim, is_looked_at: false, is_last: false })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn level(samples: u32) -> Level {
+        let aim = Some(Aim { spp: 256, first: 16, mean: samples });
+        Level { samples, aim, is_looked_at: samples == 16, is_last: samples == 256 }
+    }
+
+    #[test]
+    fn a_level_is_reached_as_far_as_time_allows() {
+        for (more, reached) in
+            [(1e9, Some(128)), (64.0, Some(128)), (63.9, Some(127)), (20.5, Some(84)), (3.9, None)]
+        {
+            let found = cut(level(128), 64, more);
+            assert_eq!(found.map(|level| level.samples), reached, "{more}");
+            assert_eq!(found.and_then(|level| level.aim).map(|aim| aim.mean), reached, "{more}");
+        }
+        // Plans are made by what all that they need has seen, and the end is the settings'.
+        let part = cut(level(16), 8, 4.0).unwrap();
+        assert_eq!((part.samples, part.is_looked_at), (12, false));
+        assert!(
+            !cut(level(256), 128, 100.0).unwrap().is_last && cut(level(256), 128, 128.0).unwrap().is_last
+        );
+        assert_eq!(cut(level(2), 1, 0.99), None, "no whole sample");
+    }
+
+    #[test]
+    fn nothing_is_left_out_without_a_limit_or_before_the_first_samples() {
+        let mut pace = Pace::new(Some(Duration::ZERO));
+        assert!(pace.is_over());
+        assert_eq!(pace.reachable(level(16), 0, 10), Some(level(16)));
+        pace.took(16, 10, Instant::now());
+        assert_eq!(pace.reachable(level(32), 16, 10), None);
+        for limit in [None, Some(Duration::MAX)] {
+            let mut pace = Pace::new(limit);
+            pace.took(16, 10, Instant::now());
+            assert!(!pace.is_over());
+            assert_eq!(pace.reachable(level(32), 16, 10), Some(level(32)));
+        }
+    }
+}
