@@ -53,7 +53,8 @@ fn cut(level: Level, before: u32, more: f64) -> Option<Level> {
     let samples = before + more as u32;
     let is_worth_it = samples > before && more >= LEAST_GAIN * f64::from(before);
     let aim = level.aim.map(|aim| Aim { mean: samples, ..aim });
-    is_worth_it.then_some(Level { samples, aim, is_looked_at: false, is_last: false })
+    // Errors are judged where samples have doubled: looked at more often, they would seem small more often.
+    is_worth_it.then_some(Level { samples, aim, is_looked_at: false, is_judged: false, is_last: false })
 }
 
 #[cfg(test)]
@@ -62,7 +63,7 @@ mod tests {
 
     fn level(samples: u32) -> Level {
         let aim = Some(Aim { spp: 256, first: 16, mean: samples });
-        Level { samples, aim, is_looked_at: samples == 16, is_last: samples == 256 }
+        Level { samples, aim, is_looked_at: samples == 16, is_judged: true, is_last: samples == 256 }
     }
 
     #[test]
@@ -76,7 +77,7 @@ mod tests {
         }
         // Plans are made by what all that they need has seen, and the end is the settings'.
         let part = cut(level(16), 8, 4.0).unwrap();
-        assert_eq!((part.samples, part.is_looked_at), (12, false));
+        assert_eq!((part.samples, part.is_looked_at, part.is_judged), (12, false, false));
         assert!(
             !cut(level(256), 128, 100.0).unwrap().is_last && cut(level(256), 128, 128.0).unwrap().is_last
         );

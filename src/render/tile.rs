@@ -115,6 +115,8 @@ pub(super) struct Level {
     pub(super) aim: Option<Aim>,
     /// Plans are made by what is seen now.
     pub(super) is_looked_at: bool,
+    /// Tiles may end here, if their error is small enough.
+    pub(super) is_judged: bool,
     pub(super) is_last: bool,
 }
 
@@ -134,6 +136,7 @@ pub(super) fn levels(scene: &Prepared, has_time_limit: bool) -> Vec<Level> {
         samples,
         aim: first.filter(|&first| samples > first).map(|first| Aim { spp, first, mean: samples }),
         is_looked_at: Some(samples) == first,
+        is_judged: samples >= FEWEST_JUDGED,
         is_last: samples == spp,
     };
     numbers.into_iter().map(level).collect()
@@ -248,7 +251,7 @@ impl Tile {
         for patch in &mut self.patches {
             patch.samples = patch.goal;
         }
-        let is_good = |goal: f32| samples >= FEWEST_JUDGED && self.error(lit) <= f64::from(goal);
+        let is_good = |goal: f32| level.is_judged && self.error(lit) <= f64::from(goal);
         self.is_finished = level.is_last || settings.error.is_some_and(is_good);
         if !self.is_finished {
             return 0;
@@ -385,7 +388,7 @@ impl Sums {
 }
 
 /// The variance of the pixel's mean from the spread of its parts' means, each weighed by its share of the samples: with equal
-/// shares, their sample variance divided by their number. 0 with a single part, which has no spread. Halves of one set complete each other:
+/// shares, their sample variance divided by their number, and of independent samples right with any. 0 with a single part, which has no spread. Halves of one set complete each other:
 /// their spread is larger than that of independent ones would be.
 fn variance_of_mean(sets: impl Iterator<Item = Part> + Clone, mean: Rgb<f64>) -> Rgb<f64> {
     let filled = || sets.clone().filter(|set| set.count > 0);
@@ -398,9 +401,9 @@ fn variance_of_mean(sets: impl Iterator<Item = Part> + Clone, mean: Rgb<f64>) ->
     for set in filled() {
         let share = f64::from(set.count) / total;
         let deviation = set.radiance / f64::from(set.count) - mean;
-        spread += deviation * deviation * (share * share);
+        spread += deviation * deviation * share;
     }
-    spread * (count as f64 / (count - 1) as f64)
+    spread / (count - 1) as f64
 }
 
 /// A variance rounded to eight bits of mantissa, one part in 512: far finer than a handful of replicates can tell, and half the
@@ -414,6 +417,7 @@ fn shortened(variance: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::hash::{mix64, unit_f32};
 
     #[test]
     fn variance_of_equal_parts_is_their_spread_over_their_number() {
@@ -423,6 +427,26 @@ mod tests {
         // Sample variance (4 + 1 + 1 + 4)/3, divided by 4.
         assert!((v.r - 10.0 / 12.0).abs() < 1e-12);
         assert_eq!(variance_of_mean(sets.into_iter().take(1), Rgb::grey(1.0)), Rgb::BLACK);
+    }
+
+    /// Of independent samples the variance of their mean is told right however they are parted.
+    #[test]
+    fn variance_of_unequal_parts_is_that_of_equal_ones() {
+        let samples: Vec<f64> = (0..24_000).map(|i| f64::from(unit_f32(mix64(i) as u32))).collect();
+        let told = |first: usize| {
+            let variances = samples.chunks(24).map(|set| {
+                let part = |values: &[f64]| Part {
+                    radiance: Rgb::grey(values.iter().sum()),
+                    count: values.len() as u32,
+                };
+                let parts = [part(&set[..first]), part(&set[first..])];
+                variance_of_mean(parts.into_iter(), Rgb::grey(set.iter().sum::<f64>() / 24.0)).r
+            });
+            variances.sum::<f64>() / 1000.0 * 24.0
+        };
+        for first in [12, 16, 23] {
+            assert!((told(first) * 12.0 - 1.0).abs() < 0.15, "{first}: {}", told(first) * 12.0);
+        }
     }
 
     #[test]

@@ -91,7 +91,8 @@ struct Printed<'a> {
 
 pub(super) fn run(arguments: &Arguments, talk: Talk) -> Outcome {
     let kernels = Kernels::chosen(arguments.kernel)?;
-    let loaded = job::load(&arguments.scene, &arguments.reading.options(), &ConvertOptions::default(), None)?;
+    let loaded = job::load(&arguments.scene, &arguments.reading.options(), &ConvertOptions::default(), None)
+        .map_err(|error| error.told())?;
     let planned =
         job::plan(&described(arguments), &loaded, &Build::current()?).map_err(|error| error.told())?;
     for warning in loaded.warnings.iter().chain(&planned.warnings) {

@@ -159,10 +159,9 @@ fn read_geometry(
                     return Err(ArisError::Unsupported {
                         place: item.place.to_string(),
                         what: format!(
-                            "a transformed copy of a mesh with which they take more than {limit} bytes"
+                            "a transformed copy of a mesh, as all would take more than {limit} bytes,"
                         ),
-                        hint: "a file that holds the mesh as often takes no more memory than it has bytes"
-                            .to_owned(),
+                        hint: "use fewer copies, or put them into the file itself".to_owned(),
                     });
                 }
                 scene.meshes.push(Arc::new(transformed(mesh, steps, item, &key)?));
