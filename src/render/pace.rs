@@ -8,7 +8,8 @@ use super::tile::Level;
 
 /// This part of the time that is left is counted on.
 const COUNTED_ON: f64 = 0.97;
-/// Pixels go on for no less than this part of the samples they have: each round costs something too.
+/// Pixels go on for no less than this part of the samples they have: each round costs something too, and if it is more than there is time
+/// for, tiles that are not reached lack no more than that.
 const LEAST_GAIN: f64 = 1.0 / 16.0;
 
 /// The time a render has, and how fast its samples come.
@@ -29,11 +30,12 @@ impl Pace {
         self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
-    /// What of the `level` so many tiles whose pixels have `before` samples can reach in time, if it is worth it; the first is always gone for.
+    /// What of the `level` so many tiles whose pixels have `before` samples can reach in time; none when time is up, but the first samples are
+    /// always taken. How fast samples came may mislead, as when another program held them up: so it goes on until time is up.
     pub(super) fn reachable(&self, level: Level, before: u32, tiles: usize) -> Option<Level> {
         let (Some(deadline), Some(seconds)) = (self.deadline, self.seconds) else { return Some(level) };
         let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-        cut(level, before, COUNTED_ON * left / (seconds * tiles as f64))
+        (!self.is_over()).then(|| cut(level, before, COUNTED_ON * left / (seconds * tiles as f64)))
     }
 
     /// So many tiles have got so many samples since `start`.
@@ -45,16 +47,16 @@ impl Pace {
     }
 }
 
-/// The level, or as much of it as `more` samples reach, if that is worth it.
-fn cut(level: Level, before: u32, more: f64) -> Option<Level> {
+/// The level, or as much of it as `more` samples reach, or the least gain.
+fn cut(level: Level, before: u32, more: f64) -> Level {
+    let more = more.max(LEAST_GAIN * f64::from(before)).max(1.0);
     if f64::from(before) + more >= f64::from(level.samples) {
-        return Some(level);
+        return level;
     }
     let samples = before + more as u32;
-    let is_worth_it = samples > before && more >= LEAST_GAIN * f64::from(before);
     let aim = level.aim.map(|aim| Aim { mean: samples, ..aim });
     // Errors are judged where samples have doubled: looked at more often, they would seem small more often.
-    is_worth_it.then_some(Level { samples, aim, is_looked_at: false, is_judged: false, is_last: false })
+    Level { samples, aim, is_looked_at: false, is_judged: false, is_last: false }
 }
 
 #[cfg(test)]
@@ -69,19 +71,16 @@ mod tests {
     #[test]
     fn a_level_is_reached_as_far_as_time_allows() {
         for (more, reached) in
-            [(1e9, Some(128)), (64.0, Some(128)), (63.9, Some(127)), (20.5, Some(84)), (3.9, None)]
+            [(1e9, 128), (64.0, 128), (63.9, 127), (20.5, 84), (3.9, 68), (0.0, 68), (f64::NAN, 68)]
         {
             let found = cut(level(128), 64, more);
-            assert_eq!(found.map(|level| level.samples), reached, "{more}");
-            assert_eq!(found.and_then(|level| level.aim).map(|aim| aim.mean), reached, "{more}");
+            assert_eq!((found.samples, found.aim.map(|aim| aim.mean)), (reached, Some(reached)), "{more}");
         }
         // Plans are made by what all that they need has seen, and the end is the settings'.
-        let part = cut(level(16), 8, 4.0).unwrap();
+        let part = cut(level(16), 8, 4.0);
         assert_eq!((part.samples, part.is_looked_at, part.is_judged), (12, false, false));
-        assert!(
-            !cut(level(256), 128, 100.0).unwrap().is_last && cut(level(256), 128, 128.0).unwrap().is_last
-        );
-        assert_eq!(cut(level(2), 1, 0.99), None, "no whole sample");
+        assert!(!cut(level(256), 128, 100.0).is_last && cut(level(256), 128, 128.0).is_last);
+        assert_eq!(cut(level(4), 2, 0.1).samples, 3, "no less than a whole sample");
     }
 
     #[test]
