@@ -388,8 +388,8 @@ impl Sums {
 }
 
 /// The variance of the pixel's mean from the spread of its parts' means, each weighed by its share of the samples: with equal
-/// shares, their sample variance divided by their number, and of independent samples right with any. 0 with a single part, which has no spread. Halves of one set complete each other:
-/// their spread is larger than that of independent ones would be.
+/// shares, their sample variance divided by their number, and of independent samples right with any. 0 with a single part, which has
+/// no spread. Halves of one set complete each other: their spread is larger than that of independent ones would be.
 fn variance_of_mean(sets: impl Iterator<Item = Part> + Clone, mean: Rgb<f64>) -> Rgb<f64> {
     let filled = || sets.clone().filter(|set| set.count > 0);
     let count = filled().count();
